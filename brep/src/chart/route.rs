@@ -51,11 +51,11 @@ impl<'a> Obstacles<'a> {
         // The multiples of the period by which a chain may be moved onto the segment.
         let rounds = |chain: &Chain, i: usize| {
             let [low, high] = [a[i].min(b[i]) - chain.high[i], a[i].max(b[i]) - chain.low[i]];
-            match self.chart.periods[i] {
-                Some(period) => (low / period).ceil() as i32..=(high / period).floor() as i32,
-                None if low <= 0.0 && 0.0 <= high => 0..=0,
-                None => 1..=0,
-            }
+            let [first, last] = match self.chart.periods[i] {
+                Some(period) => [(low / period).ceil() as i32, (high / period).floor() as i32],
+                None => [i32::from(low > 0.0), -i32::from(high < 0.0)],
+            };
+            first..=last
         };
         let crosses = |chain: &Chain, by: [i32; 2]| {
             let back = self.chart.shifted([0.0; 2], by);
