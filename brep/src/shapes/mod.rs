@@ -265,14 +265,8 @@ fn on_plane(
     curve: usize,
     size: f64,
 ) -> Result<(), BrepError> {
-    const STEPS: u32 = 8;
     let edge = &mut model.curves[curve];
-    let at = |k: u32| edge.range[0] + (edge.range[1] - edge.range[0]) * f64::from(k) / f64::from(STEPS);
-    let away = |k: u32| {
-        let point = Point::from(edge.curve.point(at(k)));
-        ((nearest_on_surface(plane, &point).point - point).norm(), point)
-    };
-    let (off, place) = (0..=STEPS).map(away).max_by(|a, b| a.0.total_cmp(&b.0)).expect("there are steps");
+    let (off, place) = imprint::furthest(plane, edge);
     if off > AWAY * size {
         let what = format!("edge {} is {off:.3e} away from it", curve + 1);
         return Err(BrepError::face(number, what, Some(place)));

@@ -76,11 +76,14 @@ fn at(edge: &EdgeCurve, share: f64) -> Point {
     Point::from(edge.curve.point(edge.range[0] + share * (edge.range[1] - edge.range[0])))
 }
 
-/// The largest distance of an edge from a surface that it bounds (length).
-pub(super) fn gap(surface: &Surface, edge: &EdgeCurve) -> f64 {
+/// The largest distance of an edge from a surface that it bounds (length), and its place there.
+pub(in super::super) fn furthest(surface: &Surface, edge: &EdgeCurve) -> (f64, Point) {
     const PLACES: u32 = 8;
-    let points = (0..=PLACES).map(|k| at(edge, f64::from(k) / f64::from(PLACES)));
-    points.map(|point| (nearest_on_surface(surface, &point).point - point).norm()).fold(0.0, f64::max)
+    let away = |k: u32| {
+        let point = at(edge, f64::from(k) / f64::from(PLACES));
+        ((nearest_on_surface(surface, &point).point - point).norm(), point)
+    };
+    (0..=PLACES).map(away).max_by(|a, b| a.0.total_cmp(&b.0)).expect("there are places")
 }
 
 /// Whether an edge without crossings lies on a surface where the surface is defined, rather than

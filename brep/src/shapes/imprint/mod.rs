@@ -9,7 +9,7 @@ mod contact;
 mod cross;
 mod regions;
 
-pub(super) use contact::{lies_on, whole};
+pub(super) use contact::{furthest, lies_on, whole};
 pub(super) use cross::overlap;
 pub(super) use regions::{Groups, is_clockwise};
 
@@ -123,7 +123,7 @@ fn gaps(
     let of = |face: usize| {
         let surface = &shapes.faces[face].surface;
         let own = shapes.curves_of(face).into_iter().filter(|&curve| is_wanted(curve));
-        own.map(|curve| (curve, contact::gap(surface, &shapes.curves[curve]))).collect::<Vec<_>>()
+        own.map(|curve| (curve, contact::furthest(surface, &shapes.curves[curve]).0)).collect::<Vec<_>>()
     };
     faces.into_par_iter().flat_map_iter(of).collect()
 }
