@@ -226,7 +226,7 @@ pub mod internals {
     pub use crate::ground::kernel::predicates::{Sign, orient3d};
     pub use crate::ground::kernel::random::Random;
     pub use crate::ground::kernel::simplex;
-    pub use crate::ground::mesh::topology;
+    pub use crate::ground::mesh::{Touching, topology};
     pub use crate::ground::projector::{BrepProjector, FacetProjector, Projector};
     pub use crate::ground::size::{GeometricSamples, GeometricSize, SizeField, UniformSize};
     pub use crate::mesher::model::CsgModel;

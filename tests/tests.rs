@@ -12,4 +12,5 @@ mod readers;
 mod samples;
 mod small_faces;
 mod surfaces;
+mod touching;
 mod writers;

@@ -7,7 +7,7 @@ use super::expected;
 use super::fill::{SURFACE_SHARE, fill};
 use super::retries::{Budget, CORRECTIONS, Once};
 use crate::Point;
-use crate::ground::mesh::{Order, Segment};
+use crate::ground::mesh::{Order, Segment, Touching};
 use crate::ground::progress::Work;
 use crate::ground::size::{GeometricSamples, GeometricSize, SizeField, SizeSettings, Source};
 use crate::ground::size::{PeriodicSize, WatchedSize};
@@ -246,15 +246,16 @@ fn attempt(
         let project = |patch, point: &Point| projector.project_patch(patch, point).unwrap_or(*point);
         let closeness = settings.size.scaled_closeness();
         let (mesh, is_ignored) = (&surface, &|_| false);
-        let walls = Walls { mesh, is_ignored, regions: &regions, project: &project, size, closeness };
-        let (sources, found) = thin_regions(&walls);
+        let (regions, touching, project) = (&regions, &Touching::default(), &project);
+        let (sources, found) =
+            thin_regions(&Walls { mesh, is_ignored, regions, touching, project, size, closeness });
         if found.places > 0 {
             return Attempt::Thin(sources, found);
         }
     }
     let smoothness = GeometrySmoothness { geometry, features };
     let smoothness = (!settings.is_final).then_some(&smoothness as &dyn Smoothness);
-    match fill(surface, regions, size, smoothness, settings.effort) {
+    match fill(surface, regions, &Touching::default(), size, smoothness, settings.effort) {
         Ok(made) => Attempt::Made(Box::new(made)),
         Err(error) => match CloseSurfaces::unresolved(model, &initial.samples, error.places()) {
             Some(walls) => Attempt::Failed(TooClose::new(walls).into()),

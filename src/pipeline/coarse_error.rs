@@ -89,18 +89,20 @@ pub enum CoarseError {
         /// Where they intersect deepest.
         at: Point,
     },
-    /// Two solids of a CAD file overlap, or touch where they have no common face.
+    /// Two solids of a CAD file overlap.
     #[error(
-        "the solids {} ({}) and {} ({}) overlap, or touch without a common face, near ({}, {}, {}): give the \
-         common part to one of them (--overlap-to smaller), cut it off in the CAD program, move one of them, or mesh one \
-         alone (--solid)",
-        solids[0].0, solids[0].1, solids[1].0, solids[1].1, first.x, first.y, first.z
+        "the solids {} ({}) and {} ({}) {}, near ({}, {}, {}): {}cut the common part off in the CAD program, move one of \
+         them, or mesh one alone (--solid)",
+        solids[0].0, solids[0].1, solids[1].0, solids[1].1, solids_meet(.are_cut), first.x, first.y, first.z,
+        if *.are_cut { "" } else { "give the common part to one of them (--overlap-to smaller), " }
     )]
     SolidsMeet {
         /// The numbers and names of the solids.
         solids: Box<[(u32, String); 2]>,
         /// Where they meet.
         first: Point,
+        /// Whether the common parts of solids were cut off before.
+        are_cut: bool,
     },
     /// A vertex could not be moved onto its face or edge.
     #[error(transparent)]
@@ -127,6 +129,11 @@ fn triangles_of(files: &Option<Box<[String; 2]>>) -> String {
 /// Says that faces intersect.
 fn faces_intersect([a, b]: &[u32; 2]) -> String {
     if a == b { format!("face {a} intersects itself") } else { format!("the faces {a} and {b} intersect") }
+}
+
+/// Says how solids meet.
+fn solids_meet(are_cut: &bool) -> &'static str {
+    if *are_cut { "still overlap where nothing more could be cut off (--overlap-to)" } else { "overlap" }
 }
 
 impl From<VolumeError> for CoarseError {

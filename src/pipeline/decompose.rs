@@ -302,7 +302,7 @@ fn fine_surface(model: &CsgModel, base: &dyn SizeField) -> Result<SurfaceMesh, C
         match mesh_surface(model, Sizes { size: &size, initial: base }, corrections < CORRECTIONS) {
             Ok((surface, _)) => {
                 // The ranks could not fill this surface, and would find out too late.
-                let mut unfit = surface::crossings(&surface.points, &surface.triangles);
+                let mut unfit = surface::crossings(&surface.points, &surface.triangles, |_, _| false);
                 unfit.extend(coincident(&surface));
                 if unfit.is_empty() || corrections == CORRECTIONS {
                     return Ok(surface);

@@ -3,12 +3,13 @@
 use super::coarse::{self, Allowed, Attempt, CoarseSettings};
 use super::coarse_error::CoarseError;
 use super::coarse_mesh::CoarseMesh;
+use super::contacts::Meeting;
 use super::error::{Error, InputError};
 use super::expected;
 use super::fill::fill;
-use super::retries::Budget;
+use super::retries::{Budget, Once};
 use super::settings::InputSettings;
-use super::solids::{self, Cad, tessellated};
+use super::solids::{Cad, Tessellated, tessellated};
 use crate::Point;
 use crate::files::surface::{self, Surface};
 use crate::ground::kernel::simplex::volume6;
@@ -17,8 +18,8 @@ use crate::ground::progress::Work;
 use crate::ground::projector::{BrepProjector, Projector};
 use crate::ground::size::{Closeness, Evaluation, SizeField, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
-    Crossing, FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks,
-    MergedSmall, RemeshSettings, SharpPlaces, Small, keep, largest_size, merge, remesh,
+    FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks, MergedSmall,
+    SharpPlaces, Small, keep, largest_size, merge,
 };
 use crate::mesher::improve::Smoothness;
 use crate::mesher::smoothness::BrepSmoothness;
@@ -47,9 +48,13 @@ pub struct FacetSolid {
     /// The exact faces and edges that the facets approximate, if there are any.
     pub exact: Option<BrepProjector>,
     /// The model that they come from, unless its small faces and edges are kept.
-    cad: Option<Arc<Cad>>,
+    pub(super) cad: Option<Arc<Cad>>,
     /// The names of the surfaces, for messages.
-    files: Vec<String>,
+    pub(super) files: Vec<String>,
+    /// Where solids overlap, if any do.
+    pub(super) overlap: Option<Meeting>,
+    /// Whether what solids had in common was given to one of them.
+    pub(super) overlaps_are_cut: bool,
 }
 
 /// Edges further from their faces than this (fraction of the size of the model) are told.
@@ -127,7 +132,18 @@ impl FacetSolid {
         let kept_edges = edges.copied().collect();
         let kept_points = surfaces.into_iter().flat_map(|surface| surface.loose_points).collect();
         let (keep_surface, files) = (settings.keep_surface, stems.to_vec());
-        Ok(Self { model, names, kept_points, kept_edges, keep_surface, exact: None, cad: None, files })
+        Ok(Self {
+            model,
+            names,
+            kept_points,
+            kept_edges,
+            keep_surface,
+            exact: None,
+            cad: None,
+            files,
+            overlap: None,
+            overlaps_are_cut: false,
+        })
     }
 
     /// Projection to patches and curves. Kept facets need none, because points between those of a
@@ -160,7 +176,8 @@ impl FacetSolid {
         note: &mut dyn FnMut(&str),
     ) -> Result<Self, Error> {
         let refuse = |error| Error::Brep { path: path.to_path_buf(), error: Box::new(error) };
-        let (cad, (model, exact)) = tessellated(brep).map_err(refuse)?;
+        let Tessellated { cad, facets: model, exact, touching, overlap } =
+            tessellated(brep).map_err(refuse)?;
         let brep = &cad.model;
         brep.notes.iter().for_each(|text| note(&format!("{}: {text}", path.display())));
         model
@@ -179,7 +196,7 @@ impl FacetSolid {
         }
         let patches = named(&brep.patch_names, model.patches.len(), |i| format!("face{i}"));
         let names = Names { bodies: labels(body_names(brep, path)), patches: labels(patches) };
-        Ok(Self {
+        let solid = Self {
             model,
             names,
             kept_points: Vec::new(),
@@ -188,7 +205,13 @@ impl FacetSolid {
             exact: Some(exact),
             cad: (!settings.keep_small && !settings.keep_surface).then(|| Arc::new(cad)),
             files: vec![path.display().to_string()],
-        })
+            overlap,
+            overlaps_are_cut: settings.overlap_to.is_some(),
+        };
+        if let Some(text) = solid.touching_note(&touching) {
+            note(&format!("{}: {text}", path.display()));
+        }
+        Ok(solid)
     }
 
     /// Merges edges and faces of a CAD file that are small beside the elements into their
@@ -208,7 +231,8 @@ impl FacetSolid {
         let size = |model: &FacetModel| -> Box<dyn SizeField> {
             Box::new(AtMost(FacetSize::evaluated(model, settings, Evaluation::Searched), largest))
         };
-        let small = Small { factor, still_factor, largest, tip_factors, size: &size };
+        let touching = &self.model.touching;
+        let small = Small { factor, still_factor, largest, tip_factors, touching, size: &size };
         let (merged, report) = merge(&cad.model, &cad.tessellation, &small);
         let solid = merged.map(|(model, exact, grouping)| {
             let label = |faces: &Vec<usize>| self.names.patches[faces[0]].clone();
@@ -220,7 +244,7 @@ impl FacetSolid {
     }
 
     /// Moves the vertices of a surface mesh from the facets onto the exact faces and edges.
-    fn snap(&self, surface: &mut SurfaceMesh) -> Result<(), CoarseError> {
+    pub(super) fn snap(&self, surface: &mut SurfaceMesh) -> Result<(), CoarseError> {
         let Some(exact) = &self.exact else { return Ok(()) };
         surface.points.par_iter_mut().zip(&surface.classes).try_for_each(|(point, class)| {
             *point = match *class {
@@ -272,35 +296,30 @@ impl FacetSolid {
         if let Err(error) = budget.expect(expected, work) {
             return Attempt::Failed(error.into());
         }
-        let regions = |id: PatchId| [self.model.patch(id).inside, self.model.patch(id).outside];
+        let regions = |id: PatchId| self.model.bodies_beside(id);
         if allowed.thin && !self.keep_surface {
             let (sources, found) = self.thin_regions(&size, &regions, settings.size.scaled_closeness());
             if found.places > 0 {
                 return Attempt::Thin(sources, found);
             }
         }
-        let mut surface = if self.keep_surface {
-            keep(&self.model)
-        } else {
-            match remesh(&self.model, &size, &RemeshSettings::default(), &|surface| self.snap(surface)) {
-                Ok((surface, _)) => surface,
-                Err(error) => return Attempt::Failed(error),
-            }
+        let (mut surface, touching, new) = match self.surface(&size) {
+            Ok(made) => made,
+            Err(error) => return Attempt::Failed(error),
         };
+        budget.warn(Once::Touching, || self.touching_note(&new), work);
         if let Err(cancelled) = work.proceed() {
             return Attempt::Failed(cancelled.into());
         }
         self.add_kept_points(&mut surface);
         self.add_kept_edges(&mut surface);
         let smoothness = self.smoothness().filter(|_| !settings.is_final);
-        match fill(surface, regions, &size, smoothness.as_deref(), settings.effort) {
+        match fill(surface, regions, &touching, &size, smoothness.as_deref(), settings.effort) {
             Ok(made) => Attempt::Made(Box::new(made)),
             Err(error) => {
                 // If triangles intersect, smaller sizes were tried already.
                 let crossed = matches!(error, CoarseError::NotClosed { .. });
-                if let Some(meeting) =
-                    crossed.then(|| self.facets_meet(&self.model.intersections())).flatten()
-                {
+                if let Some(meeting) = crossed.then(|| self.any_meeting()).flatten() {
                     return Attempt::Failed(meeting);
                 }
                 let may_lower = allowed.lower && !self.keep_surface && !crossed;
@@ -308,56 +327,6 @@ impl FacetSolid {
                 if lowered.is_empty() { Attempt::Failed(error) } else { Attempt::Lower(lowered) }
             }
         }
-    }
-
-    /// Whether solids of a CAD file overlap, or touch without a common face: no small face that is
-    /// merged changes that.
-    pub(super) fn has_overlapping_solids(&self) -> bool {
-        let may_have = self.cad.is_some() && self.model.bodies.len() > 1;
-        may_have && matches!(self.deep_meeting(), Some(CoarseError::SolidsMeet { .. }))
-    }
-
-    /// The error for facets that intersect where no finer facets would keep apart.
-    fn deep_meeting(&self) -> Option<CoarseError> {
-        let crossings = self.model.intersections();
-        let is_deep = crossings.iter().any(|crossing| self.model.is_deep(crossing));
-        let touch = || self.exact.as_ref().is_some_and(|exact| solids::touch(&self.model, exact, &crossings));
-        self.facets_meet(&crossings).filter(|_| is_deep || touch())
-    }
-
-    /// The error for facets that intersect, if any do. Intersections of different files come first.
-    fn facets_meet(&self, crossings: &[Crossing]) -> Option<CoarseError> {
-        if let Some(meeting) = crossings.iter().find_map(|crossing| self.solids_meet(crossing)) {
-            return Some(meeting);
-        }
-        if self.exact.is_some() {
-            let deepest = crossings.iter().max_by(|a, b| a.depth.total_cmp(&b.depth))?;
-            let faces = deepest.patches.map(|patch| self.names.patches[patch.index()].number);
-            return Some(CoarseError::FacesMeet { faces, count: crossings.len(), at: deepest.at });
-        }
-        let files = |crossing: &Crossing| {
-            let file = |patch| self.model.patch(patch).labels.first().map(|label| label.0);
-            let [a, b] = crossing.patches.map(file);
-            a.zip(b).filter(|(a, b)| a != b).map(|(a, b)| [a.min(b), a.max(b)])
-        };
-        let first = crossings.iter().find(|crossing| files(crossing).is_some()).or(crossings.first())?;
-        let files = files(first).map(|pair| Box::new(pair.map(|file| self.files[file as usize].clone())));
-        Some(CoarseError::FacetsMeet { files, count: crossings.len(), first: first.at })
-    }
-
-    /// The error for an intersection of faces of two solids of a CAD file.
-    fn solids_meet(&self, crossing: &Crossing) -> Option<CoarseError> {
-        self.exact.as_ref()?;
-        if !self.model.are_of_different_bodies(crossing) {
-            return None;
-        }
-        let solid = |patch: PatchId| {
-            let patch = self.model.patch(patch);
-            let label = &self.names.bodies[patch.inside.or(patch.outside)?.index()];
-            Some((label.number, label.names.first().cloned().unwrap_or_default()))
-        };
-        let [a, b] = crossing.patches.map(solid);
-        Some(CoarseError::SolidsMeet { solids: Box::new([a?, b?]), first: crossing.at })
     }
 
     /// Finds thin regions between the facets themselves.
@@ -370,7 +339,8 @@ impl FacetSolid {
         let project = |_, point: &Point| *point;
         let is_ignored = |facet| self.model.is_merged(facet);
         let mesh = &keep(&self.model);
-        thin_regions(&Walls { mesh, is_ignored: &is_ignored, regions, project: &project, size, closeness })
+        let (is_ignored, project, touching) = (&is_ignored, &project, &self.model.touching);
+        thin_regions(&Walls { mesh, is_ignored, regions, touching, project, size, closeness })
     }
 
     /// Adds points on no triangle as vertices inside.

@@ -3,7 +3,7 @@
 use super::coarse_error::CoarseError;
 use super::coarse_mesh::{CoarseMesh, CoarseReport};
 use crate::Point;
-use crate::ground::mesh::{Class, Mesh, Segment, VertexId, are_sides};
+use crate::ground::mesh::{Class, Mesh, Segment, Touching, VertexId, are_sides};
 use crate::ground::size::SizeField;
 use crate::mesher::improve::{self, Effort, Smoothness};
 use crate::mesher::surface::SurfaceMesh;
@@ -25,10 +25,12 @@ pub(super) const SURFACE_SHARE: f64 = 0.2;
 const VOLUME_SHARE: f64 = 0.4;
 
 /// Fills the bodies inside a surface mesh, and improves the result. `regions` returns the bodies
-/// behind and in front of a patch. Without `smoothness` the boundary is not moved.
+/// behind and in front of a patch; bodies that touch are filled each by itself. Without
+/// `smoothness` the boundary is not moved.
 pub(super) fn fill(
     surface: SurfaceMesh,
     regions: impl Fn(PatchId) -> [Option<BodyId>; 2],
+    touching: &Touching,
     size: &dyn SizeField,
     smoothness: Option<&dyn Smoothness>,
     effort: Option<Effort>,
@@ -39,7 +41,7 @@ pub(super) fn fill(
     if !common.is_empty() {
         return Err(CoarseError::CommonEdges { middles: common });
     }
-    let (mut mesh, volume) = fill_bodies(surface, regions, size)?;
+    let (mut mesh, volume) = fill_bodies(surface, regions, touching, size)?;
     size.work().proceed()?;
     size.work().step(VOLUME_SHARE, 1.0, 1);
     let settings = improve::Settings::of(effort.unwrap_or_else(|| effort_for(mesh.tets.len())));
@@ -87,6 +89,7 @@ fn common_edges(surface: &SurfaceMesh) -> Vec<Point> {
 fn fill_bodies(
     surface: SurfaceMesh,
     regions: impl Fn(PatchId) -> [Option<BodyId>; 2],
+    touching: &Touching,
     size: &dyn SizeField,
 ) -> Result<(Mesh, volume::Report), CoarseError> {
     // User points inside a body are on no triangle: the volume mesher receives them separately and
@@ -117,7 +120,8 @@ fn fill_bodies(
 
     let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect();
     let beside = triangles.iter().map(|t| regions(t.patch)).collect();
-    let closed = ClosedSurface::new(points[..on_surface].to_vec(), corners.clone(), beside)
+    let on_triangles = points[..on_surface].to_vec();
+    let closed = ClosedSurface::of_touching(on_triangles, corners.clone(), beside, touching)
         .map_err(|faults| {
             let crossing = volume::middles_of_sides(&points, &corners, faults.crossings());
             CoarseError::NotClosed { faults, crossing }

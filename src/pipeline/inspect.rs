@@ -1,8 +1,7 @@
 //! Describes a geometry's entities, as text and as JSON.
 
 use crate::files::input::counted;
-use crate::ground::mesh::{Label, VertexId};
-use crate::mesher::facets::FacetModel;
+use crate::ground::mesh::Label;
 use crate::mesher::model::CsgModel;
 use crate::pipeline::FacetSolid;
 use csg::{BodyId, Curve, CurveId, Features, PatchId, Singular};
@@ -142,7 +141,7 @@ impl Inspection {
 
     /// Describes triangulated solids.
     pub fn of_facets(FacetSolid { model, names, exact, .. }: &FacetSolid) -> Self {
-        let beside = patches_beside(model);
+        let beside = model.patches_of_curves();
         let number = |body: Option<BodyId>| body.map_or(0, |b| names.bodies[b.index()].number);
         let patch = |(index, patch): (usize, &crate::mesher::facets::FacetPatch)| {
             let id = PatchId::new(index);
@@ -206,24 +205,6 @@ fn singular_lines(CsgModel { geometry, features, .. }: &CsgModel) -> Vec<Singula
     let curves = curves.into_iter().map(|(id, factor)| line("curve", id.index(), factor));
     let corners = corners.into_iter().map(|(id, factor)| line("corner", id.index(), factor));
     patches.chain(curves).chain(corners).collect()
-}
-
-/// The patches on both sides of each curve.
-fn patches_beside(model: &FacetModel) -> Vec<Vec<PatchId>> {
-    let mut sides: Vec<([VertexId; 2], PatchId)> = Vec::with_capacity(3 * model.triangles.len());
-    for triangle in &model.triangles {
-        let [a, b, c] = triangle.vertices;
-        sides.extend([[a, b], [b, c], [c, a]].map(|[v, w]| ([v.min(w), v.max(w)], triangle.patch)));
-    }
-    sides.sort_unstable();
-    let beside = |curve: &crate::mesher::facets::FacetCurve| {
-        let [v, w] = [curve.vertices[0], curve.vertices[1]].map(VertexId);
-        let edge = [v.min(w), v.max(w)];
-        let first = sides.partition_point(|side| side.0 < edge);
-        let at_edge = sides[first..].iter().take_while(|side| side.0 == edge);
-        at_edge.map(|side| side.1).collect()
-    };
-    model.curves.iter().map(beside).collect()
 }
 
 /// A number rounded to nine digits.

@@ -69,7 +69,7 @@ pub struct Budget {
     /// The number of tets that was last announced to the user; infinite if none is to be.
     announced: Cell<f64>,
     /// Whether the warnings of each kind were given.
-    warned: [Cell<bool>; 2],
+    warned: [Cell<bool>; 3],
 }
 
 /// Warnings that a run gives once, however often it makes the mesh.
@@ -79,6 +79,8 @@ pub(super) enum Once {
     Walls,
     /// Of edges that are close to each other.
     Edges,
+    /// Of solids that touch.
+    Touching,
 }
 
 impl Default for Budget {

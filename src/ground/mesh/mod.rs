@@ -13,6 +13,7 @@ mod quality;
 mod sharing;
 pub mod stream;
 pub mod topology;
+mod touching;
 mod watched;
 
 pub use super::comm::Rank;
@@ -25,6 +26,7 @@ pub use order::Order;
 pub use quality::QualitySummary;
 pub(crate) use sharing::add_received;
 pub use sharing::{Neighbour, Sharing};
+pub use touching::Touching;
 pub use watched::Watched;
 
 use crate::Point;

@@ -7,6 +7,7 @@ use crate::ground::kernel::nearest::in_segment;
 use crate::ground::kernel::tree::{Tree, bounds};
 use crate::ground::size::{SizeSettings, Source, Sources, thinned};
 use crate::mesher::surface::closeness::lowered;
+use csg::PatchId;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -27,12 +28,12 @@ const MOST_CUTS: u32 = 20;
 ///
 /// Far from all sources the size is `maximum`.
 pub(super) fn sample(model: &FacetModel, settings: &SizeSettings, maximum: f64, sources: &mut Vec<Source>) {
-    let patches = patches_of_curves(model);
+    let patches = model.patches_of_curves();
     let beside = curves_of_patches(&patches, model.patches.len());
     let others: Vec<Vec<usize>> = (0..model.curves.len())
         .into_par_iter()
         .map(|c| {
-            let around = patches[c].iter().flat_map(|&patch| &beside[patch as usize]).copied();
+            let around = patches[c].iter().flat_map(|patch| &beside[patch.index()]).copied();
             around.filter(|&d| d != c && !have_common_end(&model.curves[c], &model.curves[d])).collect()
         })
         .collect();
@@ -126,30 +127,10 @@ fn have_common_end(one: &FacetCurve, other: &FacetCurve) -> bool {
 }
 
 /// The curves adjacent to each patch.
-fn curves_of_patches(patches: &[Vec<u32>], count: usize) -> Vec<Vec<usize>> {
+fn curves_of_patches(patches: &[Vec<PatchId>], count: usize) -> Vec<Vec<usize>> {
     let mut curves = vec![Vec::new(); count];
     for (c, patches) in patches.iter().enumerate() {
-        patches.iter().for_each(|&patch| curves[patch as usize].push(c));
+        patches.iter().for_each(|patch| curves[patch.index()].push(c));
     }
     curves
-}
-
-/// The patches adjacent to each curve.
-fn patches_of_curves(model: &FacetModel) -> Vec<Vec<u32>> {
-    let mut steps: Vec<([u32; 2], usize)> = Vec::new();
-    for (c, curve) in model.curves.iter().enumerate() {
-        // One step suffices: a curve ends where its adjacent patches change.
-        steps.extend(curve.vertices.windows(2).take(1).map(|w| ([w[0].min(w[1]), w[0].max(w[1])], c)));
-    }
-    steps.sort_unstable();
-    let mut patches = vec![Vec::new(); model.curves.len()];
-    for t in &model.triangles {
-        let v = t.vertices.map(|v| v.0);
-        for [a, b] in [[v[0], v[1]], [v[1], v[2]], [v[2], v[0]]] {
-            if let Ok(i) = steps.binary_search_by_key(&[a.min(b), a.max(b)], |s| s.0) {
-                patches[steps[i].1].push(t.patch.0);
-            }
-        }
-    }
-    patches
 }

@@ -21,18 +21,27 @@ pub struct Crossing {
     pub depth: f64,
 }
 
+impl Crossing {
+    /// Two triangles of some patches that intersect at a point.
+    pub fn of(patches: [PatchId; 2], triangles: &[[Point; 3]; 2], at: Point) -> Self {
+        Self { patches, at, depth: depth(triangles, &at) }
+    }
+}
+
 impl FacetModel {
-    /// Pairs of facets that intersect improperly, by exact predicates. Remeshing may remove such
-    /// intersections if they come from rounding; kept facets with intersections are rejected by
-    /// the volume mesher.
+    /// Pairs of facets that intersect improperly, by exact predicates, except those of bodies that
+    /// touch. Remeshing may remove such intersections if they come from rounding; kept facets with
+    /// intersections are rejected by the volume mesher.
     pub fn intersections(&self) -> Vec<Crossing> {
         let triangles: Vec<[u32; 3]> = self.triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect();
-        let crossing = |(pair, at): ([u32; 2], Point)| Crossing {
-            patches: pair.map(|t| self.triangles[t as usize].patch),
-            at,
-            depth: depth(&pair.map(|t| triangles[t as usize].map(|v| self.points[v as usize])), &at),
+        let crossing = |(pair, at): ([u32; 2], Point)| {
+            let corners = pair.map(|t| triangles[t as usize].map(|v| self.points[v as usize]));
+            Crossing::of(pair.map(|t| self.triangles[t as usize].patch), &corners, at)
         };
-        intersections(&self.points, &triangles).into_iter().map(crossing).collect()
+        let mut crossings: Vec<Crossing> =
+            intersections(&self.points, &triangles).into_iter().map(crossing).collect();
+        crossings.retain(|crossing| !self.may_meet(crossing.patches));
+        crossings
     }
 
     /// Whether an intersection is deeper than rounding of the coordinates explains, or the accuracy
@@ -46,9 +55,15 @@ impl FacetModel {
         crossing.depth > inaccuracy.max(DEEP * self.rounding)
     }
 
+    /// Whether facets of two patches may intersect, because they are of bodies that touch.
+    pub fn may_meet(&self, patches: [PatchId; 2]) -> bool {
+        let [a, b] = patches.map(|patch| self.bodies_beside(patch));
+        self.touching.may_meet(a, b)
+    }
+
     /// Whether no body is beside both patches of facets that intersect.
     pub fn are_of_different_bodies(&self, crossing: &Crossing) -> bool {
-        let [a, b] = crossing.patches.map(|id| [self.patch(id).inside, self.patch(id).outside]);
+        let [a, b] = crossing.patches.map(|id| self.bodies_beside(id));
         !a.iter().flatten().any(|body| b.contains(&Some(*body)))
     }
 }

@@ -4,7 +4,7 @@ use super::small::Grouping;
 use super::{BluntEnd, FacetBody, FacetCurve, FacetModel, FacetPatch, Merged};
 use crate::Vector;
 use crate::ground::kernel::tree;
-use crate::ground::mesh::{BoundaryTriangle, VertexId};
+use crate::ground::mesh::{BoundaryTriangle, Touching, VertexId};
 use crate::ground::projector::BrepProjector;
 use crate::ground::projector::facets::{FacetProjector, NO_PATCH, Source};
 use brep::{Curve, Model, On, Tessellation};
@@ -160,6 +160,7 @@ pub(super) fn grouped(
         bounds,
         projector: FacetProjector::with_normals(source, Some(normals)),
         merged,
+        touching: Touching::default(),
         blunt: blunt
             .iter()
             .map(|end| BluntEnd { patch: patch_of_face[end.patch] as usize, ..*end })

@@ -6,7 +6,7 @@ use super::regions::Regions;
 use super::{FacetError, regions};
 use crate::Point;
 use crate::ground::kernel::tree;
-use crate::ground::mesh::{BoundaryTriangle, VertexId};
+use crate::ground::mesh::{BoundaryTriangle, Touching, VertexId};
 use crate::ground::projector::facets::edges::Edges;
 use crate::ground::projector::facets::normals;
 use crate::ground::projector::facets::{FacetProjector, Source};
@@ -133,6 +133,8 @@ pub struct FacetModel {
     pub merged: Option<Merged>,
     /// Where the curvature of patches has no influence on sizes.
     pub blunt: Vec<BluntEnd>,
+    /// Bodies whose facets may intersect.
+    pub touching: Touching,
     /// Estimated rounding error of the coordinates, from their digits (length).
     pub rounding: f64,
 }
@@ -227,6 +229,34 @@ impl FacetModel {
     pub fn patch(&self, patch: PatchId) -> &FacetPatch {
         &self.patches[patch.index()]
     }
+
+    /// The bodies behind and in front of a patch.
+    pub fn bodies_beside(&self, patch: PatchId) -> [Option<BodyId>; 2] {
+        let patch = self.patch(patch);
+        [patch.inside, patch.outside]
+    }
+
+    /// The patches adjacent to each curve, ascending; a patch on both of its sides is listed twice.
+    pub fn patches_of_curves(&self) -> Vec<Vec<PatchId>> {
+        // One step suffices: a curve ends where its adjacent patches change.
+        let first_step = |(c, curve): (usize, &FacetCurve)| {
+            let [a, b] = [curve.vertices[0], curve.vertices[1]];
+            ([a.min(b), a.max(b)], c)
+        };
+        let mut steps: Vec<([u32; 2], usize)> = self.curves.iter().enumerate().map(first_step).collect();
+        steps.sort_unstable();
+        let mut patches = vec![Vec::new(); self.curves.len()];
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.vertices.map(|v| v.0);
+            for [a, b] in [[a, b], [b, c], [c, a]] {
+                if let Ok(i) = steps.binary_search_by_key(&[a.min(b), a.max(b)], |s| s.0) {
+                    patches[steps[i].1].push(triangle.patch);
+                }
+            }
+        }
+        patches.iter_mut().for_each(|patches| patches.sort_unstable());
+        patches
+    }
 }
 
 /// Removes triangles without a body on either side.
@@ -302,6 +332,7 @@ fn assemble(joined: Joined, regions: &Regions, found: Found, bounds: Aabb, round
         projector,
         merged: None,
         blunt: Vec::new(),
+        touching: Touching::default(),
         rounding,
     }
 }

@@ -30,7 +30,7 @@ fn model(files: &[Facets]) -> FacetModel {
 /// The facets remeshed with their vertices on them.
 pub(super) fn remeshed(model: &FacetModel, size: &dyn SizeField) -> (SurfaceMesh, RemeshReport) {
     let stay = |_: &mut SurfaceMesh| Ok::<(), Infallible>(());
-    remesh(model, size, &RemeshSettings::default(), &stay).unwrap_or_else(|never| match never {})
+    remesh(model, size, &RemeshSettings::default(), &stay, &|_| false).unwrap_or_else(|never| match never {})
 }
 
 /// A box 1024 times as long as wide took 40 times as many splits as triangles were left.

@@ -16,7 +16,7 @@ use super::SurfaceMesh;
 use crate::ground::kernel::nearest::{at, in_triangle};
 use crate::ground::kernel::simplex::area_vector;
 use crate::ground::kernel::tree::{Tree, bounds};
-use crate::ground::mesh::Class;
+use crate::ground::mesh::{Class, Touching};
 use crate::ground::size::{Closeness, SizeField, Source, thinned};
 use crate::{Point, Vector};
 use csg::{Aabb, BodyId, PatchId};
@@ -57,6 +57,8 @@ pub struct Walls<'a> {
     pub is_ignored: &'a (dyn Fn(u32) -> bool + Sync),
     /// The bodies behind and in front of each patch.
     pub regions: &'a (dyn Fn(PatchId) -> [Option<BodyId>; 2] + Sync),
+    /// Bodies that touch: patches of theirs are no walls of each other.
+    pub touching: &'a Touching,
     /// Projection onto the patch itself.
     pub project: &'a (dyn Fn(PatchId, &Point) -> Point + Sync),
     /// The sizes to be lowered.
@@ -257,12 +259,14 @@ impl<'a> Prober<'a> {
     fn nearest(&self, t: u32, center: &Point, radius: f64) -> Option<(u32, Point)> {
         let patch = self.walls.mesh.triangles[t as usize].patch;
         let adjacent = &self.adjacent[patch.index()];
+        let beside = (self.walls.regions)(patch);
         let normal = self.normals[t as usize];
         let foot = |s: u32| at(&self.corners[s as usize], in_triangle(center, &self.corners[s as usize]));
         let mut best: Option<(f64, u32)> = None;
         self.tree.nearest_within(center, radius * radius, |other| {
             let other = PatchId(other);
-            if adjacent.binary_search(&other).is_ok() {
+            let do_touch = self.walls.touching.may_meet(beside, (self.walls.regions)(other));
+            if do_touch || adjacent.binary_search(&other).is_ok() {
                 return f64::INFINITY;
             }
             let (triangles, tree) = &self.patches[other.index()];
@@ -375,7 +379,8 @@ mod tests {
         thin_regions(&Walls {
             mesh: &keep(model),
             is_ignored: &|_| false,
-            regions: &|patch| [model.patch(patch).inside, model.patch(patch).outside],
+            regions: &|patch| model.bodies_beside(patch),
+            touching: &model.touching,
             project: &|_, point| *point,
             size: &UniformSize(size),
             closeness,

@@ -73,11 +73,16 @@ impl SurfaceMesh {
 }
 
 /// The midpoints of the edges of triangles that intersect others outside common corners and edges,
-/// by exact predicates: smaller sizes there separate them.
-pub(crate) fn crossings(points: &[Point], triangles: &[BoundaryTriangle]) -> Vec<Point> {
+/// by exact predicates: smaller sizes there separate them. Pairs that may intersect are left out.
+pub(crate) fn crossings(
+    points: &[Point],
+    triangles: &[BoundaryTriangle],
+    may_meet: impl Fn([BoundaryTriangle; 2], &Point) -> bool,
+) -> Vec<Point> {
     let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.vertices.map(|v| v.0)).collect();
-    let pairs = intersections(points, &corners);
-    middles_of_sides(points, &corners, pairs.into_iter().map(|(pair, _)| pair))
+    let mut found = intersections(points, &corners);
+    found.retain(|(pair, at)| !may_meet(pair.map(|t| triangles[t as usize]), at));
+    middles_of_sides(points, &corners, found.into_iter().map(|(pair, _)| pair))
 }
 
 /// Settings of surface meshing.

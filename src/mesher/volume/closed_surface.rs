@@ -16,7 +16,8 @@ use std::collections::BTreeSet;
 /// every edge, the region in front of one triangle equals the region behind the next. This allows
 /// several bodies with interfaces, holes, voids, surfaces that touch themselves along edges or at
 /// vertices, and triangles with one body on both sides (cracks). Triangles intersect only in common
-/// corners and edges, by exact predicates.
+/// corners and edges, by exact predicates; those of [bodies that touch](ClosedSurface::of_touching)
+/// may intersect elsewhere.
 #[derive(Clone, Debug, Default)]
 pub struct ClosedSurface {
     pub(crate) points: Vec<Point>,
@@ -24,6 +25,8 @@ pub struct ClosedSurface {
     pub(crate) regions: Vec<[Option<BodyId>; 2]>,
     pub(crate) kept_points: Vec<Point>,
     pub(crate) kept_edges: Vec<[u32; 2]>,
+    /// Whether each body is filled by itself.
+    pub(super) is_apart: bool,
 }
 
 impl ClosedSurface {
@@ -40,7 +43,7 @@ impl ClosedSurface {
         triangles: Vec<[u32; 3]>,
         regions: Vec<[Option<BodyId>; 2]>,
     ) -> Result<Self, SurfaceFaults> {
-        let surface = Self { points, triangles, regions, kept_points: Vec::new(), kept_edges: Vec::new() };
+        let surface = Self { points, triangles, regions, ..Self::default() };
         for find in [Self::index_faults, Self::form_faults] {
             let faults = find(&surface);
             if !faults.is_empty() {
@@ -50,14 +53,15 @@ impl ClosedSurface {
         Ok(surface)
     }
 
-    /// Adds points that become vertices of the mesh; they must lie strictly inside bodies.
+    /// Adds points that become vertices of the mesh; they must lie strictly inside bodies that
+    /// touch no others.
     #[must_use]
     pub fn with_kept_points(mut self, points: Vec<Point>) -> Self {
         self.kept_points = points;
         self
     }
 
-    /// Adds edges that become edges of the mesh; they must lie inside bodies.
+    /// Adds edges that become edges of the mesh; they must lie inside bodies that touch no others.
     ///
     /// Indices count the points of the surface first, then those of
     /// [`ClosedSurface::with_kept_points`]. One or both ends may be on the surface, and edges may
@@ -100,7 +104,7 @@ impl ClosedSurface {
         self.points[self.triangles[triangle][0] as usize]
     }
 
-    fn index_faults(&self) -> Vec<SurfaceFault> {
+    pub(super) fn index_faults(&self) -> Vec<SurfaceFault> {
         let (points, triangles) = (self.points.len(), self.triangles.len());
         if triangles == 0 {
             return vec![SurfaceFault::Empty];
@@ -137,7 +141,7 @@ impl ClosedSurface {
     ///
     /// Degenerate and duplicate triangles are left out of the edge checks, so that a flat triangle
     /// is not also reported as a hole.
-    fn form_faults(&self) -> Vec<SurfaceFault> {
+    pub(super) fn form_faults(&self) -> Vec<SurfaceFault> {
         let scale = finish::scale_of(&self.points);
         let points: Vec<Point> = self.points.iter().map(|p| p * scale).collect();
         let (mut faults, first_at) = self.double_points();

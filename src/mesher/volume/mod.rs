@@ -36,9 +36,12 @@
 //!    blocks on all threads if many points are expected. The growth of sizes is limited for any
 //!    field (`sizes`).
 //!
+//! If bodies touch, the steps are done for each body by itself (`apart`).
+//!
 //! Not guaranteed: shape. Steps 1 to 5 make whatever tets the surface allows; step 6 makes nearly
 //! all tets well-shaped, but slivers remain: see [`improve`](crate::mesher::improve).
 
+mod apart;
 mod blocks;
 mod bound;
 mod boxes;
@@ -240,6 +243,8 @@ fn list_places(triangles: &[u32], places: &[Point]) -> String {
 /// The triangles of the surface become exactly the boundary faces of the tets. All tets are
 /// positively oriented by exact sign. The result is deterministic.
 ///
+/// If bodies touch, the surface must not have kept points and edges.
+///
 /// # Errors
 /// All errors carry coordinates, except the last:
 /// - [`VolumeError::NotRecovered`] if some triangles could not be made faces of the mesh,
@@ -253,6 +258,9 @@ pub fn mesh(
     size: &dyn SizeField,
     settings: &Settings,
 ) -> Result<(VolumeMesh, Report), VolumeError> {
+    if surface.is_apart {
+        return apart::mesh(surface, size, settings);
+    }
     let scale = finish::scale_of(&surface.points);
     let points: Vec<Point> = surface.points.iter().map(|p| p * scale).collect();
     let mut report = Report::default();

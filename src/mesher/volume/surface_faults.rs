@@ -101,6 +101,27 @@ pub enum SurfaceFault {
 }
 
 impl SurfaceFault {
+    /// Changes the numbers of points and triangles to those of a surface of which this is a part.
+    pub(super) fn renumber(&mut self, points: &[u32], triangles: &[u32]) {
+        let point = |number: &mut u32| *number = points[*number as usize];
+        let triangle = |number: &mut u32| *number = triangles[*number as usize];
+        match self {
+            Self::SamePlace { points, .. } => points.iter_mut().for_each(point),
+            Self::NotFinite { point: number } | Self::UnusedPoint { point: number, .. } => point(number),
+            Self::Flat { triangle: number, .. } | Self::BoundsNothing { triangle: number, .. } => {
+                triangle(number);
+            }
+            Self::Twice { triangles, .. } | Self::Intersect { triangles, .. } => {
+                triangles.iter_mut().for_each(triangle);
+            }
+            Self::Overlap { edge, triangles, .. } | Self::NotClosed { edge, triangles, .. } => {
+                edge.iter_mut().for_each(point);
+                triangles.iter_mut().for_each(triangle);
+            }
+            Self::NoSuchPoint { .. } | Self::Empty | Self::RegionCount { .. } | Self::TooLarge { .. } => {}
+        }
+    }
+
     /// The position of the fault, if it has one.
     pub fn place(&self) -> Option<Point> {
         match self {

@@ -2,7 +2,7 @@
 
 use super::{LatticeSkin, Skin, SkinTriangle};
 use crate::ground::mesh::stream::{MeshStream, TetBlock};
-use crate::ground::mesh::{BoundaryTriangle, Class, Mesh, Segment, VertexId};
+use crate::ground::mesh::{BoundaryTriangle, Class, Mesh, Segment, Touching, VertexId};
 use crate::ground::projector::Projector;
 use crate::ground::size::SizeField;
 use crate::mesher::improve::{self, Smoothness};
@@ -76,12 +76,7 @@ pub fn fill(skin: &Skin, size: &dyn SizeField, how: Improvement) -> Result<Fille
     if skin.triangles.is_empty() {
         return Ok(Filled::default());
     }
-    let (on_triangles, inside) = skin.points.split_at(skin.on_triangles);
-    let corners = skin.triangles.iter().map(|t| t.vertices).collect();
-    let beside = skin.triangles.iter().map(|t| t.beside).collect();
-    let surface = ClosedSurface::new(on_triangles.to_vec(), corners, beside)?
-        .with_kept_points(inside.to_vec())
-        .with_kept_edges(skin.loose_edges());
+    let surface = closed(skin)?;
     let (filled, report) = volume::mesh(&surface, size, &volume::Settings::default())?;
     if report.on_kept_edges > 0 {
         return Err(FillError::CutEdges(report.on_kept_edges));
@@ -109,6 +104,27 @@ pub fn fill(skin: &Skin, size: &dyn SizeField, how: Improvement) -> Result<Fille
         inside: made.points[skin.points.len()..].iter().map(|p| [p.x, p.y, p.z]).collect(),
         refused: None,
     })
+}
+
+/// The surface of a part with its interior vertices and edges. Bodies whose triangles intersect
+/// were found to touch before, when the coarse mesh was made.
+fn closed(skin: &Skin) -> Result<ClosedSurface, SurfaceFaults> {
+    let (on_triangles, inside) = skin.points.split_at(skin.on_triangles);
+    let beside: Vec<[Option<BodyId>; 2]> = skin.triangles.iter().map(|t| t.beside).collect();
+    let surface = |touching: &Touching| {
+        let corners = skin.triangles.iter().map(|t| t.vertices).collect();
+        ClosedSurface::of_touching(on_triangles.to_vec(), corners, beside.clone(), touching)
+    };
+    let loose = skin.loose_edges();
+    let can_be_apart = inside.is_empty() && loose.is_empty();
+    let bounded = surface(&Touching::default()).or_else(|faults| {
+        let mut touching = Touching::default();
+        for [a, b] in faults.crossings().filter(|_| can_be_apart) {
+            touching.add(beside[a as usize], beside[b as usize]);
+        }
+        if touching.is_empty() { Err(faults) } else { surface(&touching) }
+    })?;
+    Ok(bounded.with_kept_points(inside.to_vec()).with_kept_edges(loose))
 }
 
 /// The tets of the lattice.

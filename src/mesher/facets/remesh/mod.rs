@@ -26,7 +26,7 @@ mod split;
 pub use deviation::deviation;
 pub use report::RemeshReport;
 
-use super::{FacetModel, FacetSize};
+use super::{Crossing, FacetModel, FacetSize};
 use crate::Point;
 use crate::ground::progress::Work;
 use crate::ground::size::{SizeField, Source, SourceTree};
@@ -97,9 +97,10 @@ const LOWERED: f64 = 0.6;
 /// Corners are the first vertices, in their order, followed by the vertices on curves, curve by
 /// curve, and those on patches. Vertices lie on the facets and polylines up to rounding, from where
 /// `snap` moves them onto the surfaces that these stand for. If triangles of close patches then
-/// intersect, the sizes there are lowered and the mesh is refined further as long as that helps;
-/// [`RemeshReport::crossings`] lists intersections that remain, for example because the facets
-/// themselves intersect. If the work of the size field is cancelled, the mesh is returned as it is.
+/// intersect, unless their bodies `touch` there, the sizes are lowered and the mesh is refined
+/// further as long as that helps; [`RemeshReport::crossings`] lists intersections that remain, for
+/// example because the facets themselves intersect. If the work of the size field is cancelled, the
+/// mesh is returned as it is.
 ///
 /// # Errors
 /// Those of `snap`.
@@ -108,19 +109,24 @@ pub fn remesh<E: Send>(
     size: &dyn SizeField,
     settings: &RemeshSettings,
     snap: &Snap<E>,
+    touch: &Touch,
 ) -> Result<(SurfaceMesh, RemeshReport), E> {
     // In a thread of the pool, so that no call of the pool waits for another thread to wake up.
-    rayon::scope(|_| remesh_in_pool(model, size, settings, snap))
+    rayon::scope(|_| remesh_in_pool(model, size, settings, snap, touch))
 }
 
 /// Moves the vertices of a surface mesh.
 type Snap<'a, E> = dyn Fn(&mut SurfaceMesh) -> Result<(), E> + Sync + 'a;
+
+/// Whether triangles may intersect.
+type Touch<'a> = dyn Fn(&Crossing) -> bool + Sync + 'a;
 
 fn remesh_in_pool<E>(
     model: &FacetModel,
     size: &dyn SizeField,
     settings: &RemeshSettings,
     snap: &Snap<E>,
+    touch: &Touch,
 ) -> Result<(SurfaceMesh, RemeshReport), E> {
     let tree = |sources: &[Source]| SourceTree::new(model.bounds, LOWERED_GRADING, f64::INFINITY, sources);
     let sizes = Sizes { wanted: size, turn: FacetSize::of_turn(model, settings.turn), lowered: tree(&[]) };
@@ -135,7 +141,10 @@ fn remesh_in_pool<E>(
         pass(&mut sheet, rounds, settings, &mut report);
         let mut mesh = finish::finish(&sheet);
         snap(&mut mesh)?;
-        report.crossings = crossings(&mesh.points, &mesh.triangles);
+        report.crossings = crossings(&mesh.points, &mesh.triangles, |pair, at| {
+            let corners = pair.map(|t| t.vertices.map(|v| mesh.points[v.index()]));
+            touch(&Crossing::of(pair.map(|t| t.patch), &corners, *at))
+        });
         // No size removes intersections of the facets themselves.
         let is_input_crossed =
             correction == 0 && !report.crossings.is_empty() && !model.intersections().is_empty();

@@ -5,6 +5,7 @@ use super::faces::{Joins, joins};
 use super::layout::Layout;
 use super::report::{MergedEdge, MergedFace, MergedSmall, NamedFace};
 use crate::Point;
+use crate::ground::mesh::Touching;
 use crate::ground::projector::BrepProjector;
 use crate::ground::size::SizeField;
 use crate::mesher::facets::FacetModel;
@@ -35,6 +36,8 @@ pub struct Small<'a> {
     /// Tips of faces are cut off where elements are this many times as large as their width: those
     /// with sharp edges, and those that go on smoothly beyond an edge.
     pub tip_factors: [f64; 2],
+    /// The bodies that touch.
+    pub touching: &'a Touching,
     /// The wanted size of elements of a model.
     pub size: &'a dyn Fn(&FacetModel) -> Box<dyn SizeField>,
 }
@@ -126,7 +129,8 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> Outcom
         let joins = joins(layout, &allowed.faces);
         let (grouping, chains) = grouping(layout, &joins, &allowed.edges);
         let mut report = report(layout, &joins, &chains, &allowed.edges);
-        let (facets, exact) = grouped(model, tessellation, shape, &grouping, &layout.blunt);
+        let (mut facets, exact) = grouped(model, tessellation, shape, &grouping, &layout.blunt);
+        facets.touching = small.touching.clone();
         let size = (small.size)(&facets);
         if !report.named.is_empty() {
             // A narrow face lowers the sizes around it: the largest one is that of all others.

@@ -1,4 +1,5 @@
 use super::{MergedSmall, Small, merge};
+use crate::ground::mesh::Touching;
 use crate::ground::size::{SizeField, UniformSize};
 use crate::mesher::facets::FacetModel;
 use brep::{Model, Settings, Tessellation, Unit};
@@ -23,6 +24,7 @@ fn merged_with(mut model: Model, size: &dyn Fn(&FacetModel) -> f64) -> (Option<F
         still_factor: 5.0,
         largest: f64::INFINITY,
         tip_factors: [10.0, 4.0],
+        touching: &Touching::default(),
         size: &size,
     };
     let (merged, report) = merge(&model, &tessellation, &small);
