@@ -241,6 +241,18 @@ fn solids_within_a_face_divide_it() {
 }
 
 #[test]
+fn edges_on_one_line_do_not_hide_each_other() {
+    // The first edge of the upper face and that of the block on it.
+    let outline =
+        [[2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0], [0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [2.0, 2.0]];
+    let mut solids = Solids::default();
+    solids.prism(&outline.map(|[x, y]| X * x + Y * y), [0.0, 1.0], &[]);
+    solids.block([0.2, 1.0, 1.0], [0.6, 1.5, 2.0]);
+    let model = assert_measures(solids, &[5.0, 0.2], 0.2);
+    assert_eq!(model.patches.len(), 10 + 1 + 5);
+}
+
+#[test]
 fn curved_edges_cross_straight_ones_and_touch_them() {
     // A cylinder over an edge of a block, and one whose circle touches that edge from inside.
     for (center, area) in

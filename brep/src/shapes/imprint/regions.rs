@@ -274,36 +274,59 @@ impl Sheet<'_> {
             let known = *at.entry(self.origin(half)).or_insert(half / 2);
             component.join(known, half / 2);
         }
+        let mut members: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for k in 0..self.strips.len() {
+            members.entry(component.root(k)).or_default().push(k);
+        }
         let first = component.root(0);
         let mut lines = Vec::new();
-        for k in (0..self.strips.len()).filter(|&k| component.root(k) == k) {
+        for (&root, own) in &members {
             let rounds: &[[i32; 2]] = match [0, 1].map(|i| self.chart.period(i)) {
                 // Two regions of a torus may have the same two boundaries.
                 [Some(_), Some(_)] => &[[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]],
                 _ => &[[0, 0]],
             };
-            let rounds = rounds.iter().filter(|rounds| k != first || **rounds != [0, 0]);
-            lines.extend(rounds.map(|&rounds| self.line(k, first, rounds)));
+            let rounds = rounds.iter().filter(|rounds| root != first || **rounds != [0, 0]);
+            lines.extend(rounds.filter_map(|&rounds| self.clearest([own, &members[&first]], rounds)));
         }
-        lines
+        lines.into_iter().map(|line| self.hits(&line)).collect()
     }
 
-    /// What a line from one strip to another crosses, in its order, with both ends. It goes around
-    /// the surface by `rounds`.
-    fn line(&self, from: usize, to: usize, rounds: [i32; 2]) -> Vec<Hit> {
+    /// The line from one of some strips to one of others that is furthest from the directions of
+    /// both: the edges of equal holes in a row are on lines between them.
+    fn clearest(&self, [from, to]: [&[usize]; 2], rounds: [i32; 2]) -> Option<Line> {
+        /// At most so many strips of each are tried.
+        const TRIED: usize = 16;
+        let tried = |strips: &'_ [usize]| -> Vec<usize> {
+            strips.iter().copied().step_by(strips.len().div_ceil(TRIED).max(1)).collect()
+        };
+        let (from, to) = (tried(from), tried(to));
+        let lines =
+            from.iter().flat_map(|&a| to.iter().map(move |&b| [a, b])).map(|ends| self.line(ends, rounds));
+        let clearest = lines.max_by(|a, b| a.sine.total_cmp(&b.sine))?;
+        (clearest.sine > ALONG).then_some(clearest)
+    }
+
+    /// The line from one strip to another. It goes around the surface by `rounds`.
+    fn line(&self, strips: [usize; 2], rounds: [i32; 2]) -> Line {
         let place = |strip: &Strip| {
             let last = strip.nodes.len() - 1;
             let k = ((last as f64 * PLACE[0]) as usize).min(last - 1);
             let [p, q] = [strip.nodes[k], strip.nodes[k + 1]];
             (k, [0, 1].map(|i| p[i] + PLACE[1] * (q[i] - p[i])), minus(q, p))
         };
-        let [(first, start, along), (last, end, back)] = [from, to].map(|k| place(&self.strips[k]));
+        let [(first, start, along), (last, end, back)] = strips.map(|k| place(&self.strips[k]));
         let end = self.chart.shifted(self.chart.unwrapped(end, start), rounds);
         let way = minus(end, start);
-        let is_along = |side| cross(side, way).abs() <= ALONG * size(side) * size(way);
-        if is_along(along) || is_along(back) {
-            return Vec::new();
-        }
+        let sine = |side| cross(side, way).abs() / (size(side) * size(way));
+        let sine = sine(along).min(sine(back));
+        Line { strips, segments: [first, last], start, end, along, back, sine }
+    }
+
+    /// What a line crosses, in its order, with both ends.
+    fn hits(&self, line: &Line) -> Vec<Hit> {
+        let Line { strips: [from, to], segments: [first, last], start, end, along, back, .. } = *line;
+        let way = minus(end, start);
         let half = |k: usize, is_left: bool| 2 * k + usize::from(!is_left);
         let mut hits = vec![Hit { at: 0.0, before: 0, after: half(from, cross(along, way) > 0.0) }];
         hits.push(Hit { at: 1.0, before: half(to, cross(back, way) < 0.0), after: 0 });
@@ -346,6 +369,20 @@ impl Sheet<'_> {
         let (in_u, in_v) = (range(0), range(1));
         in_u.iter().flat_map(|&u| in_v.iter().map(move |&v| [u, v])).collect()
     }
+}
+
+/// A line in the parameters from one strip to another.
+struct Line {
+    strips: [usize; 2],
+    /// The segments of both on which it starts and ends.
+    segments: [usize; 2],
+    start: Parameters,
+    end: Parameters,
+    /// The directions of both there.
+    along: Parameters,
+    back: Parameters,
+    /// The sine of the smaller angle with these.
+    sine: f64,
 }
 
 /// Where a line crosses a strip: its share of the line, and the halves whose left sides are before

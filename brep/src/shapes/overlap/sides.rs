@@ -27,6 +27,8 @@ pub(super) enum Side {
 
 /// Faces whose directions from a curve differ by less (radians) are tangent there.
 const TANGENT: f64 = 1e-3;
+/// Places are this far beside a curve (share of its length up to where it is asked).
+const BESIDE: f64 = 0.1;
 /// Where curves are asked (share of their range).
 const PLACE: f64 = 0.43;
 /// At most so many points of a part of a surface are compared with triangles.
@@ -43,6 +45,8 @@ pub(super) struct Uses<'a> {
 struct Spoke {
     /// The unit vector into the face, across the curve.
     inward: Vector,
+    /// The way to a place of the surface beside the curve.
+    beside: Vector,
     /// The unit normal out of its solid.
     outward: Vector,
 }
@@ -160,19 +164,19 @@ impl<'a> Uses<'a> {
         let across = along.cross(&own.inward);
         let faces =
             self.of[&curve].iter().map(|of| of.0).filter(|&face| self.shapes.faces[face].body == other);
-        let mut last: Option<(f64, bool)> = None;
-        for there in faces.flat_map(|face| self.spokes(edge, curve, face)) {
-            let angle = there.inward.dot(&across).atan2(there.inward.dot(&own.inward)).rem_euclid(TAU);
-            if !(TANGENT..=TAU - TANGENT).contains(&angle) {
-                return None;
-            }
-            // The direction of growing angles leads from that face into its body, or out of it.
-            let is_inside = there.outward.dot(&along.cross(&there.inward)) < 0.0;
-            if last.is_none_or(|(largest, _)| largest < angle) {
-                last = Some((angle, is_inside));
-            }
+        let angle = |way: &Vector| way.dot(&across).atan2(way.dot(&own.inward)).rem_euclid(TAU);
+        let there: Vec<Spoke> = faces.flat_map(|face| self.spokes(edge, curve, face)).collect();
+        let angles: Vec<f64> = there.iter().map(|spoke| angle(&spoke.inward)).collect();
+        if angles.iter().any(|angle| !(TANGENT..=TAU - TANGENT).contains(angle)) {
+            return None;
         }
-        last.map(|(_, is_inside)| is_inside)
+        // Of faces that are tangent to each other the order is that of places beside the curve.
+        let largest = angles.iter().copied().fold(0.0, f64::max);
+        let last = there.iter().zip(&angles).filter(|(_, angle)| **angle > largest - TANGENT);
+        let beside = |spoke: &Spoke| angle(&spoke.beside);
+        let (last, _) = last.max_by(|(a, _), (b, _)| beside(a).total_cmp(&beside(b)))?;
+        // The direction of growing angles leads from that face into its body, or out of it.
+        Some(last.outward.dot(&along.cross(&last.inward)) < 0.0)
     }
 
     /// A face seen from one of its curves, twice if it is on both sides of it.
@@ -183,13 +187,16 @@ impl<'a> Uses<'a> {
         face: usize,
     ) -> impl Iterator<Item = Spoke> + use<'b> {
         let (place, along) = at(edge);
+        let step = BESIDE * (Point::from(edge.curve.point(edge.range[0])) - place).norm();
         let uses = self.of[&curve].iter().filter(move |of| of.0 == face);
         let owner = &self.shapes.faces[face];
         let normal = nearest_on_surface(&owner.surface, &place).normal;
         let outward = if owner.is_behind { normal } else { -normal };
         uses.filter_map(move |&(_, is_forward)| {
             let inward = normal.cross(&along).try_normalize(0.0)?;
-            Some(Spoke { inward: if is_forward { inward } else { -inward }, outward })
+            let inward = if is_forward { inward } else { -inward };
+            let beside = nearest_on_surface(&owner.surface, &(place + inward * step)).point - place;
+            Some(Spoke { inward, beside, outward })
         })
     }
 

@@ -1,7 +1,7 @@
 //! Solids that overlap, made by hand.
 
 use crate::shapes::tests::{Solids, X, Y, Z, measured, square};
-use crate::{Model, OverlapTo, Vector};
+use crate::{Model, OverlapTo, Unit, Vector};
 use std::f64::consts::PI;
 
 fn cut(solids: Solids, to: OverlapTo) -> (Model, Vec<f64>, f64) {
@@ -115,4 +115,28 @@ fn solids_that_only_touch_are_not_changed() {
     let before = model.clone();
     model.cut_overlaps(OverlapTo::First).unwrap();
     assert_eq!(model, before);
+}
+
+#[test]
+fn faces_cross_beyond_an_edge_on_the_same_line() {
+    // The upper edge of the low step and the curve in which the block cuts the high one.
+    let mut solids = Solids::default();
+    solids.block([-5.0, 0.0, -0.75], [5.0, 6.0, 0.75]);
+    let step = [[-8.0, -3.0], [8.0, -3.0], [8.0, 1.0], [-2.0, 1.0], [-2.0, 0.0], [-8.0, 0.0]];
+    solids.prism(&step.map(|[x, y]| X * x + Y * y), [-3.0, -0.25], &[]);
+    let (_, volumes, area) = cut(solids, OverlapTo::First);
+    assert_near(&volumes, &[90.0, 159.5 - 3.5]);
+    // The low step below the block, and its bed in the high one: floor, end and side.
+    assert_near(&[area], &[0.5 * 3.0 + 0.5 * 7.0 + 0.5 + 7.0]);
+}
+
+#[test]
+fn faces_of_a_solid_may_be_tangent_to_each_other_where_another_one_meets_them() {
+    // A cable against a block with a saddle as wide as the block: it tapers to nothing there.
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../geometries/step/saddle.step");
+    let mut model = Model::read_step(&std::fs::read(path).unwrap(), Unit::OfFile).unwrap();
+    model.cut_overlaps(OverlapTo::Smaller).unwrap();
+    let (_, volumes, area) = measured(model);
+    assert_near(&volumes, &[48.0 - 4.5 * PI, 45.0 * PI]);
+    assert_near(&[area], &[3.0 * PI]);
 }
