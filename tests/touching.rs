@@ -33,17 +33,17 @@ fn solids_that_touch_in_lines_and_points_are_meshed_each_by_itself() {
     let mut notes = Vec::new();
     let geometry =
         Geometry::read(&[&path], &InputSettings::default(), &mut |note| notes.push(note.to_owned())).unwrap();
-    assert!(notes.iter().any(|note| note.contains("touch in a line or a point near (")), "{notes:?}");
+    assert!(notes.iter().any(|note| note.contains("touch without a common face near (")), "{notes:?}");
     // By the CAD program.
     let exact = [60.0, 15.708, 9.2028, 16.085, 7.0882];
     let check = |arrays: &Arrays| {
         let (common, volumes) = common_vertices_and_volumes(arrays, 5);
         assert_eq!(common, BTreeSet::from([[0, 3]]), "the ring and the plate have a common face");
         for (found, exact) in volumes.iter().zip(exact) {
-            assert!((found / exact - 1.0).abs() < 0.03, "{volumes:?}");
+            assert!((found / exact - 1.0).abs() < 0.01, "{volumes:?}");
         }
     };
-    let mesher = Mesher::new().levels(1);
+    let mesher = Mesher::new().levels(2);
     let mesh = mesher.generate(&geometry).unwrap();
     check(&mesh.arrays());
     let angle = mesh.coarse.as_ref().unwrap().report.quality.smallest_dihedral;

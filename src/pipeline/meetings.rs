@@ -102,7 +102,7 @@ impl FacetSolid {
             more => format!(", and {more} more pairs of solids touch so"),
         };
         Some(format!(
-            "the solids {a} ({name_a}) and {b} ({name_b}) touch in a line or a point near ({}, {}, {}){more}: there they \
+            "the solids {a} ({name_a}) and {b} ({name_b}) touch without a common face near ({}, {}, {}){more}: there they \
              have no common vertices, each solid is meshed by itself",
             at.x, at.y, at.z
         ))

@@ -18,9 +18,9 @@ mod start;
 mod tests;
 mod trace;
 
-use super::split::inner_parameter;
 use super::{Face, Shapes, imprint, reversed};
 use crate::model::{Corner, EdgeCurve};
+use crate::nearest::nearest_on_curve;
 use crate::tessellate::{Shell, Tessellation};
 use crate::{BrepError, Point};
 use fit::Fitted;
@@ -158,7 +158,12 @@ impl Shapes {
             let is_known = !pair.contains(&start.point)
                 || branches.iter().any(|branch| pair.is_on(branch, &start))
                 || crossing.on.iter().flatten().any(|&curve| {
-                    inner_parameter(&self.curves[curve], &start.point, AT_EDGE * room, 0.0).is_some()
+                    let edge = &self.curves[curve];
+                    let foot = nearest_on_curve(&edge.curve, &start.point);
+                    // The rest of a circle is an edge of the face beside this one.
+                    let is_on_edge = edge.curve.period().is_some()
+                        || (edge.range[0]..=edge.range[1]).contains(&foot.parameter);
+                    is_on_edge && (foot.point - start.point).norm() <= AT_EDGE * room
                 });
             if !is_known && branches.len() < MOST_BRANCHES {
                 let mut branch = pair.branch(start);
