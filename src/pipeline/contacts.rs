@@ -191,6 +191,9 @@ impl<'a> Contacts<'a> {
         let step = STEP * self.size;
         let along = |way: Vector| Some((tilt(normals(&(at + way * step))?) - here) / step);
         let bend = Matrix2::from_columns(&[along(x)?, along(y)?]);
+        if !bend.iter().chain(&here).all(|x| x.is_finite()) {
+            return None;
+        }
         let way = bend.pseudo_inverse(ALIKE * bend.norm()).ok()? * here;
         (way.norm() > SHORTEST * self.size).then(|| at - x * way.x - y * way.y)
     }

@@ -99,7 +99,8 @@ impl FacetSolid {
         let at = first.at;
         let more = match touching.len() - 1 {
             0 => String::new(),
-            more => format!(", and {more} more pairs of solids touch so"),
+            1 => ", and so does another pair of solids".into(),
+            more => format!(", and so do {more} other pairs"),
         };
         Some(format!(
             "the solids {a} ({name_a}) and {b} ({name_b}) touch without a common face near ({}, {}, {}){more}: there they \
