@@ -297,14 +297,14 @@ impl Sheet<'_> {
     fn clearest(&self, [from, to]: [&[usize]; 2], rounds: [i32; 2]) -> Option<Line> {
         /// At most so many strips of each are tried.
         const TRIED: usize = 16;
-        let tried = |strips: &'_ [usize]| -> Vec<usize> {
+        let tried = |strips: &[usize]| -> Vec<usize> {
             strips.iter().copied().step_by(strips.len().div_ceil(TRIED).max(1)).collect()
         };
         let (from, to) = (tried(from), tried(to));
         let lines =
             from.iter().flat_map(|&a| to.iter().map(move |&b| [a, b])).map(|ends| self.line(ends, rounds));
-        let clearest = lines.max_by(|a, b| a.sine.total_cmp(&b.sine))?;
-        (clearest.sine > ALONG).then_some(clearest)
+        // A line without length has no direction.
+        lines.filter(|line| line.sine > ALONG).max_by(|a, b| a.sine.total_cmp(&b.sine))
     }
 
     /// The line from one strip to another. It goes around the surface by `rounds`.

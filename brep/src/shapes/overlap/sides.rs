@@ -43,10 +43,9 @@ pub(super) struct Uses<'a> {
 
 /// A face seen from one of its curves.
 struct Spoke {
+    face: usize,
     /// The unit vector into the face, across the curve.
     inward: Vector,
-    /// The way to a place of the surface beside the curve.
-    beside: Vector,
     /// The unit normal out of its solid.
     outward: Vector,
 }
@@ -173,10 +172,18 @@ impl<'a> Uses<'a> {
         // Of faces that are tangent to each other the order is that of places beside the curve.
         let largest = angles.iter().copied().fold(0.0, f64::max);
         let last = there.iter().zip(&angles).filter(|(_, angle)| **angle > largest - TANGENT);
-        let beside = |spoke: &Spoke| angle(&spoke.beside);
+        let beside = |spoke: &Spoke| angle(&self.way_beside(edge, spoke));
         let (last, _) = last.max_by(|(a, _), (b, _)| beside(a).total_cmp(&beside(b)))?;
         // The direction of growing angles leads from that face into its body, or out of it.
         Some(last.outward.dot(&along.cross(&last.inward)) < 0.0)
+    }
+
+    /// The way from a curve to a place of a face's surface beside it.
+    fn way_beside(&self, edge: &EdgeCurve, spoke: &Spoke) -> Vector {
+        let place = at(edge).0;
+        let step = BESIDE * (Point::from(edge.curve.point(edge.range[0])) - place).norm();
+        let surface = &self.shapes.faces[spoke.face].surface;
+        nearest_on_surface(surface, &(place + spoke.inward * step)).point - place
     }
 
     /// A face seen from one of its curves, twice if it is on both sides of it.
@@ -187,7 +194,6 @@ impl<'a> Uses<'a> {
         face: usize,
     ) -> impl Iterator<Item = Spoke> + use<'b> {
         let (place, along) = at(edge);
-        let step = BESIDE * (Point::from(edge.curve.point(edge.range[0])) - place).norm();
         let uses = self.of[&curve].iter().filter(move |of| of.0 == face);
         let owner = &self.shapes.faces[face];
         let normal = nearest_on_surface(&owner.surface, &place).normal;
@@ -195,8 +201,7 @@ impl<'a> Uses<'a> {
         uses.filter_map(move |&(_, is_forward)| {
             let inward = normal.cross(&along).try_normalize(0.0)?;
             let inward = if is_forward { inward } else { -inward };
-            let beside = nearest_on_surface(&owner.surface, &(place + inward * step)).point - place;
-            Some(Spoke { inward, beside, outward })
+            Some(Spoke { face, inward, outward })
         })
     }
 
