@@ -8,7 +8,7 @@
 use crate::ground::kernel::nearest::{at, in_segment, in_triangle};
 use crate::ground::kernel::predicates::{Sign, orient3d};
 use crate::ground::kernel::tree::{Tree, bounds};
-use crate::ground::mesh::{BoundaryTriangle, Touching};
+use crate::ground::mesh::{BoundaryTriangle, Touching, pairs_of_bodies};
 use crate::ground::projector::BrepProjector;
 use crate::mesher::facets::{Crossing, FacetModel};
 use crate::{Point, Vector};
@@ -209,10 +209,8 @@ impl<'a> Contacts<'a> {
         for &Crossing { patches, at, .. } in crossings {
             let beside = patches.map(|patch| self.model.bodies_beside(patch));
             touching.add(beside[0], beside[1]);
-            for a in beside[0].into_iter().flatten() {
-                for b in beside[1].into_iter().flatten() {
-                    first.entry([a.min(b), a.max(b)]).or_insert(Meeting { patches, at });
-                }
+            for pair in pairs_of_bodies(beside[0], beside[1]) {
+                first.entry(pair).or_insert(Meeting { patches, at });
             }
         }
         for (&[a, b], meeting) in &first {

@@ -27,6 +27,7 @@ pub use quality::QualitySummary;
 pub(crate) use sharing::add_received;
 pub use sharing::{Neighbour, Sharing};
 pub use touching::Touching;
+pub(crate) use touching::{have_common_body, pairs_of_bodies};
 pub use watched::Watched;
 
 use crate::Point;

@@ -14,7 +14,7 @@ pub struct Touching(BTreeSet<[BodyId; 2]>);
 impl Touching {
     /// Adds each body of one surface with each of the other.
     pub fn add(&mut self, one: [Option<BodyId>; 2], other: [Option<BodyId>; 2]) {
-        self.0.extend(pairs(one, other));
+        self.0.extend(pairs_of_bodies(one, other));
     }
 
     /// Whether there are no such bodies.
@@ -26,13 +26,21 @@ impl Touching {
     /// bodies beside them touch.
     pub fn may_meet(&self, one: [Option<BodyId>; 2], other: [Option<BodyId>; 2]) -> bool {
         !self.is_empty()
-            && pairs(one, other).all(|[a, b]| a != b)
-            && pairs(one, other).any(|pair| self.0.contains(&pair))
+            && !have_common_body(one, other)
+            && pairs_of_bodies(one, other).any(|pair| self.0.contains(&pair))
     }
 }
 
-/// All pairs of bodies on one surface and another one, ascending.
-fn pairs(one: [Option<BodyId>; 2], other: [Option<BodyId>; 2]) -> impl Iterator<Item = [BodyId; 2]> {
+/// Whether a body is beside both of two surfaces.
+pub(crate) fn have_common_body(one: [Option<BodyId>; 2], other: [Option<BodyId>; 2]) -> bool {
+    one.iter().flatten().any(|body| other.contains(&Some(*body)))
+}
+
+/// All pairs of bodies beside one surface and another one, ascending.
+pub(crate) fn pairs_of_bodies(
+    one: [Option<BodyId>; 2],
+    other: [Option<BodyId>; 2],
+) -> impl Iterator<Item = [BodyId; 2]> {
     let bodies = one.into_iter().flatten();
     bodies.flat_map(move |a| other.into_iter().flatten().map(move |b| [a.min(b), a.max(b)]))
 }

@@ -3,6 +3,7 @@
 use super::FacetModel;
 use crate::ground::kernel::nearest::in_segment;
 use crate::ground::kernel::simplex::area_vector;
+use crate::ground::mesh::have_common_body;
 use crate::mesher::volume::intersections;
 use crate::{Point, Vector};
 use csg::PatchId;
@@ -64,7 +65,7 @@ impl FacetModel {
     /// Whether no body is beside both patches of facets that intersect.
     pub fn are_of_different_bodies(&self, crossing: &Crossing) -> bool {
         let [a, b] = crossing.patches.map(|id| self.bodies_beside(id));
-        !a.iter().flatten().any(|body| b.contains(&Some(*body)))
+        !have_common_body(a, b)
     }
 }
 

@@ -6,7 +6,7 @@
 use super::surface_faults::{SurfaceFault, SurfaceFaults};
 use super::{ClosedSurface, Report, Settings, VolumeError, VolumeMesh, intersections, mesh as fill};
 use crate::Point;
-use crate::ground::mesh::Touching;
+use crate::ground::mesh::{Touching, have_common_body};
 use crate::ground::size::SizeField;
 use csg::BodyId;
 use std::collections::BTreeSet;
@@ -59,8 +59,8 @@ impl ClosedSurface {
         }
         for (pair, place) in intersections(&self.points, &self.triangles) {
             let [a, b] = pair.map(|t| self.regions[t as usize]);
-            let is_of_one = a.iter().flatten().any(|body| b.contains(&Some(*body)));
-            if !is_of_one && !touching.may_meet(a, b) {
+            // Those of one body are among its faults.
+            if !have_common_body(a, b) && !touching.may_meet(a, b) {
                 faults.push(SurfaceFault::Intersect { triangles: pair, place });
             }
         }
