@@ -16,24 +16,67 @@ pub struct SourceTree {
     bounds: Aabb,
     grading: f64,
     maximum: f64,
-    cells: Vec<Cell>,
+    root: Cell,
+    cells: Cells,
 }
 
-#[derive(Clone, Copy, Debug)]
-enum Cell {
-    /// Index of the first of eight children.
-    Split(u32),
-    /// The values at the corners: bit 0 of the index is x, bit 1 y, bit 2 z.
-    Leaf([f32; 8]),
+/// Cells without their places. The way down to a leaf is in few bytes, which stay in the cache, and
+/// ends with one read of its values.
+#[derive(Clone, Debug, Default)]
+struct Cells {
+    /// The children of each split cell.
+    split: Vec<[Cell; 8]>,
+    leaves: Vec<Leaf>,
 }
+
+/// A split cell, or a leaf if its highest bit is set; the other bits are its index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Cell(u32);
+
+const IS_LEAF: u32 = 1 << 31;
+
+/// The values at the corners: bit 0 of the index is x, bit 1 y, bit 2 z.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+struct Leaf([f32; 8]);
+
+/// Places in the tree are multiples of 2⁻⁶³ of its edge: one bit for each level.
+const PLACE_BITS: u32 = 63;
 
 impl Cell {
-    /// The same cell after all cells of its tree are moved by `shift` indices.
-    fn shifted(&self, shift: u32) -> Cell {
-        match self {
-            Cell::Split(first) => Cell::Split(first + shift),
-            Cell::Leaf(corners) => Cell::Leaf(*corners),
-        }
+    /// Stands for a cell that is not finished.
+    const OPEN: Self = Self(IS_LEAF - 1);
+
+    fn split(index: usize) -> Self {
+        assert!(index < IS_LEAF as usize, "a tree of sizes has too many cells");
+        Self(index as u32)
+    }
+
+    fn leaf(index: usize) -> Self {
+        assert!(index < IS_LEAF as usize, "a tree of sizes has too many leaves");
+        Self(index as u32 | IS_LEAF)
+    }
+
+    fn is_leaf(self) -> bool {
+        self.0 & IS_LEAF != 0
+    }
+
+    fn index(self) -> usize {
+        (self.0 & !IS_LEAF) as usize
+    }
+}
+
+impl Cells {
+    /// Adds the cells of another tree, with their root `root`, which is returned as a cell of this
+    /// one.
+    fn append(&mut self, root: Cell, other: Cells) -> Cell {
+        let (split, leaves) = (self.split.len(), self.leaves.len());
+        let moved = |cell: Cell| {
+            if cell.is_leaf() { Cell::leaf(leaves + cell.index()) } else { Cell::split(split + cell.index()) }
+        };
+        self.split.extend(other.split.into_iter().map(|children| children.map(moved)));
+        self.leaves.extend(other.leaves);
+        moved(root)
     }
 }
 
@@ -70,12 +113,15 @@ struct Limits {
     small: f64,
     large: f64,
     bent: f64,
+    /// The edge of cells at which places have no bits left.
+    least_edge: f64,
 }
 
 impl Limits {
-    fn new(grading: f64, roughness: f64) -> Self {
+    fn new(grading: f64, roughness: f64, side: f64) -> Self {
         let part = (STEEP / grading).min(1.0) * roughness;
-        Self { small: SMALL * part, large: LARGE * part, bent: BENT * roughness }
+        let least_edge = side * 0.5_f64.powi(PLACE_BITS as i32 - 2);
+        Self { small: SMALL * part, large: LARGE * part, bent: BENT * roughness, least_edge }
     }
 
     /// Whether interpolation in a cell is accurate enough.
@@ -85,7 +131,7 @@ impl Limits {
         let large = if least > (1.0 - self.bent) * least_known { SHOWN * self.large } else { self.large };
         let mean = corners.iter().sum::<f64>() / 8.0;
         let is_flat = edge < large * least && (mean - center).abs() < self.bent * center;
-        least >= maximum || edge < self.small * least || is_flat
+        least >= maximum || edge < (self.small * least).max(self.least_edge) || is_flat
     }
 }
 
@@ -119,8 +165,8 @@ impl SourceTree {
         sources: &[Source],
         roughness: f64,
     ) -> Self {
-        let limits = Limits::new(grading, roughness);
         let side = (bounds.max - bounds.min).max().max(f64::MIN_POSITIVE);
+        let limits = Limits::new(grading, roughness, side);
         let center = bounds.center();
         let half = Vector::repeat(0.5 * side);
         let cube = Aabb { min: center - half, max: center + half };
@@ -139,76 +185,59 @@ impl SourceTree {
             start: sources.whole(),
         };
         let [root, ..] = children(&sources, &around);
-        Self { bounds: cube, grading, maximum, cells: grow(&sources, &limits, root) }
+        let (root, cells) = grow(&sources, &limits, &root, PARALLEL_DEPTH);
+        Self { bounds: cube, grading, maximum, root, cells }
     }
 
     /// The size at `point`.
     pub fn size_at(&self, point: &Point) -> f64 {
-        let inside = Point::from(point.coords.sup(&self.bounds.min.coords).inf(&self.bounds.max.coords));
-        let mut min = self.bounds.min;
-        let mut edge = self.bounds.max.x - self.bounds.min.x;
-        let mut cell = 0;
-        let corners = loop {
-            match &self.cells[cell] {
-                Cell::Leaf(corners) => break corners,
-                Cell::Split(first) => {
-                    edge *= 0.5;
-                    let child = (0..3)
-                        .filter(|&axis| inside[axis] >= min[axis] + edge)
-                        .fold(0, |c, axis| c | 1 << axis);
-                    min += octant(child, edge);
-                    cell = *first as usize + child;
-                }
-            }
-        };
-        let size = interpolate(corners, (inside - min) / edge);
+        let Aabb { min, max } = self.bounds;
+        let inside = Point::from(point.coords.sup(&min.coords).inf(&max.coords));
+        let most = (1_u64 << PLACE_BITS) - 1;
+        let per_step = (1_u64 << PLACE_BITS) as f64 / (max.x - min.x);
+        let place = [0, 1, 2].map(|axis| (((inside[axis] - min[axis]) * per_step) as u64).min(most));
+        let (mut cell, mut level) = (self.root, PLACE_BITS);
+        while !cell.is_leaf() {
+            level -= 1;
+            let side = |axis: usize| (place[axis] >> level & 1) << axis;
+            cell = self.cells.split[cell.index()][(side(0) | side(1) | side(2)) as usize];
+        }
+        let edge = 1_u64 << level;
+        let at = Vector::from(place.map(|x| (x & (edge - 1)) as i64 as f64 / edge as f64));
+        let size = interpolate(&self.cells.leaves[cell.index()].0, at);
         (size + self.grading * (point - inside).norm()).min(self.maximum)
     }
 }
 
-/// The cells of the subtree below a draft, its root first.
-fn grow(sources: &Sources, limits: &Limits, root: Draft) -> Vec<Cell> {
-    let mut cells = vec![Cell::Split(0)];
-    let mut open = vec![(0, root)];
-    for _ in 0..PARALLEL_DEPTH {
-        for (at, draft) in std::mem::take(&mut open) {
-            finish((sources, limits), at, &draft, &mut cells, &mut open);
-        }
+/// The cells of the subtree below a draft, and its root; the subtrees `parallel` levels below are
+/// built by all threads.
+fn grow(sources: &Sources, limits: &Limits, draft: &Draft, parallel: u32) -> (Cell, Cells) {
+    let mut cells = Cells::default();
+    if parallel == 0 || limits.allow(draft, sources.maximum()) {
+        let root = grow_alone(sources, limits, draft, &mut cells);
+        return (root, cells);
     }
-    let below = |(_, draft): &(usize, Draft)| {
-        let mut cells = vec![Cell::Split(0)];
-        let mut open = vec![(0, *draft)];
-        while let Some((at, draft)) = open.pop() {
-            finish((sources, limits), at, &draft, &mut cells, &mut open);
-        }
-        cells
-    };
-    let parts: Vec<Vec<Cell>> = open.par_iter().map(below).collect();
-    for ((at, _), part) in open.iter().zip(&parts) {
-        // The root of a part replaces its placeholder, the others are appended.
-        let shift = cells.len() as u32 - 1;
-        cells[*at] = part[0].shifted(shift);
-        cells.extend(part[1..].iter().map(|cell| cell.shifted(shift)));
+    let below = |child: &Draft| grow(sources, limits, child, parallel - 1);
+    let parts: Vec<(Cell, Cells)> = children(sources, draft).par_iter().map(below).collect();
+    cells.split.push([Cell::OPEN; 8]);
+    for (i, (root, part)) in parts.into_iter().enumerate() {
+        cells.split[0][i] = cells.append(root, part);
     }
-    cells
+    (Cell::split(0), cells)
 }
 
-/// Makes a cell a leaf, or splits it and adds its children to the open cells.
-fn finish(
-    (sources, limits): (&Sources, &Limits),
-    at: usize,
-    draft: &Draft,
-    cells: &mut Vec<Cell>,
-    open: &mut Vec<(usize, Draft)>,
-) {
+/// Adds the subtree below a draft to `cells`; returns its root.
+fn grow_alone(sources: &Sources, limits: &Limits, draft: &Draft, cells: &mut Cells) -> Cell {
     if limits.allow(draft, sources.maximum()) {
-        cells[at] = Cell::Leaf(draft.corners.map(|value| value as f32));
-        return;
+        cells.leaves.push(Leaf(draft.corners.map(|value| value as f32)));
+        return Cell::leaf(cells.leaves.len() - 1);
     }
-    let first = cells.len();
-    cells[at] = Cell::Split(first as u32);
-    cells.extend([Cell::Split(0); 8]);
-    open.extend((first..).zip(children(sources, draft)));
+    let index = cells.split.len();
+    cells.split.push([Cell::OPEN; 8]);
+    for (i, child) in children(sources, draft).iter().enumerate() {
+        cells.split[index][i] = grow_alone(sources, limits, child, cells);
+    }
+    Cell::split(index)
 }
 
 /// The eight children of a cell.
@@ -253,6 +282,12 @@ fn interpolate(corners: &[f32; 8], at: Vector) -> f64 {
 mod tests {
     use super::*;
 
+    impl SourceTree {
+        fn leaves(&self) -> usize {
+            self.cells.leaves.len()
+        }
+    }
+
     /// Points of a low-discrepancy sequence in the unit cube.
     fn scattered(count: usize) -> impl Iterator<Item = Point> {
         (1..=count).map(|i| {
@@ -286,7 +321,7 @@ mod tests {
         let rough = SourceTree::with_roughness(bounds, grading, maximum, &sources, 2.0);
         let (worst, mean) = errors(&|p| rough.size_at(p));
         assert!(worst <= 2.0 * most && mean < 0.04, "{worst}, {mean}");
-        assert!(2 * rough.cells.len() < tree.cells.len(), "{} cells", rough.cells.len());
+        assert!(2 * rough.leaves() < tree.leaves(), "{} leaves", rough.leaves());
         let searched = Sources::new(grading, maximum, &sources);
         let (worst, mean) = errors(&|p| searched.size_at(p));
         assert!(worst <= 0.0102 && mean < 0.005, "{worst}, {mean}");
@@ -300,9 +335,18 @@ mod tests {
             .collect();
         let bounds = Aabb { min: Point::new(0., 0., 0.), max: Point::new(1., 1., 1.) };
         let tree = SourceTree::new(bounds, 0.3, 10.0, &sources);
-        assert!(tree.cells.len() < 50 * sources.len(), "{} cells", tree.cells.len());
+        assert!(tree.leaves() < 50 * sources.len(), "{} leaves", tree.leaves());
         assert!((tree.size_at(&center) - 0.14).abs() < 0.01);
         assert!(tree.size_at(&Point::new(2.0, 0.5, 0.5)) > 0.02 + 0.3 * 1.09);
+    }
+
+    #[test]
+    fn the_steepest_field_ends_where_places_do() {
+        let source = Source { point: Point::new(0.3, 0.4, 0.6), size: 1e-300 };
+        let bounds = Aabb { min: Point::new(0., 0., 0.), max: Point::new(1., 1., 1.) };
+        let tree = SourceTree::new(bounds, 1e9, 1.0, &[source]);
+        assert!(tree.size_at(&source.point) < 1e-8);
+        assert_eq!(tree.size_at(&bounds.max), 1.0);
     }
 
     #[test]
