@@ -87,8 +87,8 @@ pub(super) fn mesh_pieces(
         let messages = skins.map(|skins| skins.messages);
         let message = progress.stage(Stage::Distribute, |_| comm.scatter_bytes(0, messages))?;
         let (skin, sizes) = unpack(&message);
-        let filled = progress.stage(Stage::Fill, |_| fill(comm.rank(), &skin, &sizes, how));
-        let filled = comm.agree(filled)?;
+        // The stage ends on all ranks together.
+        let filled = progress.stage(Stage::Fill, |_| comm.agree(fill(comm.rank(), &skin, &sizes, how)))?;
         if goal.is_reached(comm, filled.tets.len())? {
             let delivered = skin::delivered(comm, &skin, &filled, &sizes)?;
             let part = progress.stage(Stage::Number, |_| skin::number(comm, skin, filled, boundary[0]))?;

@@ -123,7 +123,9 @@ fn expected_tets_of<'a>(
     const DENSITY: f64 = 6.0 * std::f64::consts::SQRT_2;
     tets.iter().map(move |tet| {
         let [a, b, c, d] = tet.map(|v| points[v.index()]);
-        let density = tet.iter().map(|v| sizes[v.index()].powi(-3)).sum::<f64>() / 4.0;
+        // Sizes are linear in a tet. The mean of their power -3 is that of the geometric mean to a
+        // few percent; the mean of the powers at the corners is 1.6 times it where sizes double.
+        let density = tet.iter().map(|v| sizes[v.index()]).product::<f64>().powf(-0.75);
         DENSITY * density * volume6(&a, &b, &c, &d).abs() / 6.0
     })
 }
