@@ -227,7 +227,8 @@ mod tests {
         let graph = graph();
         // Six tets a cube, 64 cubes a layer: four slabs.
         let slabs: Vec<Rank> = (0..graph.len()).map(|tet| (tet / (6 * 128)) as Rank).collect();
-        let wrong = |(tet, &p): (usize, &Rank)| if mix(tet as u64) % 16 == 0 { (p + 1) % 4 } else { p };
+        let wrong =
+            |(tet, &p): (usize, &Rank)| if mix(tet as u64).is_multiple_of(16) { (p + 1) % 4 } else { p };
         let mut part: Vec<Rank> = slabs.iter().enumerate().map(wrong).collect();
         assert!(cut(&graph, &part) > 2 * cut(&graph, &slabs));
         refine(&graph, &mut part, 4, 780);
