@@ -75,9 +75,13 @@ const FULL: usize = 8;
 /// A cluster that ends with fewer vertices than this joins a neighbour.
 const FEW: usize = 4;
 
-/// Clusters are within blocks of this many consecutive vertices, which are independent. Tets follow
-/// a space-filling curve, so few neighbours are in other blocks.
+/// Clusters are within blocks of this many consecutive vertices, which are independent. Tets that
+/// are made here follow a space-filling curve, so few neighbours are in other blocks.
 const BLOCK: usize = 1 << 16;
+
+/// Blocks are of no use if their clusters have fewer vertices than this on average: tets of a file
+/// may be in any order.
+const SCATTERED: usize = 3;
 
 /// Vertices in clusters.
 pub(super) struct Clustering {
@@ -95,11 +99,15 @@ pub(super) fn cluster(graph: &impl Adjacency, heaviest: i64) -> Clustering {
     let blocks = graph.len().div_ceil(BLOCK);
     let range = |block: usize| block * BLOCK..((block + 1) * BLOCK).min(graph.len());
     let parts = map_each((0..blocks).map(range).collect(), |range| cluster_block(graph, range, heaviest));
-    let mut count = 0;
+    let count: usize = parts.iter().map(|part| part.count).sum();
+    if blocks > 1 && SCATTERED * count > graph.len() {
+        return cluster_block(graph, 0..graph.len(), heaviest);
+    }
     let mut of = Vec::with_capacity(graph.len());
+    let mut before = 0;
     for part in parts {
-        of.extend(part.of.iter().map(|cluster| count as u32 + cluster));
-        count += part.count;
+        of.extend(part.of.iter().map(|cluster| before + cluster));
+        before += part.count as u32;
     }
     Clustering { of, count }
 }
@@ -232,6 +240,7 @@ fn members(clusters: &Clustering) -> (Vec<u32>, Vec<u32>) {
 mod tests {
     use super::super::{dual, matched_faces};
     use super::*;
+    use crate::ground::kernel::random::mix;
     use crate::ground::mesh::fixtures::lattice_cube;
 
     /// 82,944 tets: two blocks.
@@ -261,6 +270,16 @@ mod tests {
             }
             assert_eq!(met.len(), members.len());
         }
+    }
+
+    #[test]
+    fn vertices_in_any_order_are_clustered_as_well() {
+        let mut mesh = lattice_cube(36);
+        let count = mesh.tets.len() as u64;
+        mesh.tets.sort_by_key(|tet| mix(tet.iter().fold(count, |key, v| mix(key ^ u64::from(v.0)))));
+        let graph = dual::dual(&matched_faces(&mesh).unwrap());
+        let clusters = cluster(&graph, 1000);
+        assert!(5 * clusters.count < graph.len(), "{} clusters", clusters.count);
     }
 
     #[test]
