@@ -179,16 +179,17 @@ fn strongest(list: &[(u32, i64)]) -> Option<u32> {
     list.iter().rev().max_by_key(|(_, weight)| *weight).map(|&(item, _)| item)
 }
 
-/// The graph of clusters: weights add, also those of edges between the same two clusters.
-pub(super) fn contract(graph: &impl Adjacency, clusters: &Clustering) -> Graph {
-    let (starts, members) = members(clusters);
+/// The graph of `count` clusters, given that of each vertex: weights add, also those of edges
+/// between the same two clusters.
+pub(super) fn contract(graph: &impl Adjacency, of: &[u32], count: usize) -> Graph {
+    let (starts, members) = members(of, count);
     let of_range = |range: Range<usize>| {
         let mut part = Graph::default();
         let mut beside: Vec<(u32, i64)> = Vec::new();
         for cluster in range {
             let members = &members[starts[cluster] as usize..starts[cluster + 1] as usize];
             let edges = members.iter().flat_map(|&member| graph.edges(member));
-            let edges = edges.map(|(other, weight)| (clusters.of[other as usize], weight));
+            let edges = edges.map(|(other, weight)| (of[other as usize], weight));
             beside.clear();
             beside.extend(edges.filter(|(other, _)| *other as usize != cluster));
             beside.sort_unstable_by_key(|(other, _)| *other);
@@ -201,8 +202,8 @@ pub(super) fn contract(graph: &impl Adjacency, clusters: &Clustering) -> Graph {
         }
         part
     };
-    let parts: Vec<Graph> = map_each(ranges(clusters.count), of_range);
-    let mut offsets = Vec::with_capacity(clusters.count + 1);
+    let parts: Vec<Graph> = map_each(ranges(count), of_range);
+    let mut offsets = Vec::with_capacity(count + 1);
     offsets.push(0);
     for part in &parts {
         let start = offsets[offsets.len() - 1];
@@ -223,13 +224,13 @@ pub(super) fn contract(graph: &impl Adjacency, clusters: &Clustering) -> Graph {
 }
 
 /// The vertices of each cluster one after the other, and where each cluster starts.
-fn members(clusters: &Clustering) -> (Vec<u32>, Vec<u32>) {
-    let mut starts = vec![0u32; clusters.count + 1];
-    clusters.of.iter().for_each(|&cluster| starts[cluster as usize + 1] += 1);
-    (0..clusters.count).for_each(|cluster| starts[cluster + 1] += starts[cluster]);
+fn members(of: &[u32], count: usize) -> (Vec<u32>, Vec<u32>) {
+    let mut starts = vec![0u32; count + 1];
+    of.iter().for_each(|&cluster| starts[cluster as usize + 1] += 1);
+    (0..count).for_each(|cluster| starts[cluster + 1] += starts[cluster]);
     let mut next = starts.clone();
-    let mut members = vec![0; clusters.of.len()];
-    for (vertex, &cluster) in (0..).zip(&clusters.of) {
+    let mut members = vec![0; of.len()];
+    for (vertex, &cluster) in (0..).zip(of) {
         members[next[cluster as usize] as usize] = vertex;
         next[cluster as usize] += 1;
     }
@@ -252,7 +253,7 @@ mod tests {
     fn clusters_are_connected_and_neither_small_nor_large() {
         let graph = graph();
         let clusters = cluster(&graph, 1000);
-        let (starts, members) = members(&clusters);
+        let (starts, members) = members(&clusters.of, clusters.count);
         assert!(Adjacency::len(&graph) > BLOCK && members.len() == Adjacency::len(&graph));
         assert!(6 * clusters.count < members.len(), "{} clusters", clusters.count);
         for ends in starts.windows(2) {
@@ -288,7 +289,7 @@ mod tests {
         let weights: Vec<i32> = (0..dual.len()).map(|tet| if tet % 5 == 0 { 7 } else { 1 }).collect();
         let graph = WeightedDual { dual: &dual, weights: &weights };
         let clusters = cluster(&graph, 5);
-        let coarse = contract(&graph, &clusters);
+        let coarse = contract(&graph, &clusters.of, clusters.count);
         assert!(coarse.weights.iter().all(|&weight| weight <= 5 || weight == 7));
         assert!(2 * clusters.count < dual.len(), "{} clusters", clusters.count);
     }
@@ -297,7 +298,7 @@ mod tests {
     fn a_contracted_graph_has_all_weight_and_each_edge_in_both_rows() {
         let graph = graph();
         let clusters = cluster(&graph, 1000);
-        let coarse = contract(&graph, &clusters);
+        let coarse = contract(&graph, &clusters.of, clusters.count);
         assert_eq!(coarse.weights.iter().sum::<i32>() as usize, graph.len());
         let twice = |vertex: u32| {
             let here = clusters.of[vertex as usize];

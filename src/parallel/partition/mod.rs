@@ -41,7 +41,6 @@ use contract::WeightedDual;
 use dual::Dual;
 use std::ops::Range;
 use ties::{Clusters, Ties};
-use weighted::Graph;
 
 /// A partitioning method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -258,7 +257,8 @@ fn assign(
     let mut part = match (settings.method, &clusters) {
         (Method::Metis, None) => by_graph(&dual, whole.as_deref(), parts, settings.seed)?,
         (Method::Metis, Some(clusters)) => {
-            let of_cluster = by_weights(&clusters.graph(&dual, whole.as_deref()), parts, settings.seed)?;
+            let of_cluster =
+                multilevel::of_graph(&clusters.graph(&dual, whole.as_deref()), parts, settings.seed)?;
             clusters.of.iter().map(|&cluster| of_cluster[cluster as usize]).collect()
         }
         (Method::Bisection, _) => rcb::bisect(mesh, parts),
@@ -283,15 +283,6 @@ fn by_graph(
         (true, Some(weights)) => multilevel::partition(&WeightedDual { dual, weights }, parts, seed),
         (false, None) => graph::bisect(dual, parts, seed),
         (false, Some(weights)) => graph::bisect_weighted(&dual.weighted(weights), parts, seed),
-    }
-}
-
-/// Partitions a weighted graph by METIS.
-fn by_weights(graph: &Graph, parts: u32, seed: i32) -> Result<Vec<Rank>, PartitionError> {
-    if multilevel::is_large(graph.weights.len(), parts) {
-        multilevel::partition(graph, parts, seed)
-    } else {
-        graph::bisect_weighted(graph, parts, seed)
     }
 }
 

@@ -40,25 +40,28 @@ pub(super) fn partition(graph: &impl Adjacency, parts: u32, seed: i32) -> Result
     let total: i64 = (0..graph.len() as u32).map(|vertex| graph.weight(vertex)).sum();
     let mean = total as f64 / f64::from(parts);
     let clusters = cluster(graph, (HEAVIEST * mean) as i64);
-    let coarse = contract(graph, &clusters);
-    let of_cluster = coarse_partition(&coarse, parts, seed, graph.len())?;
+    let coarse = contract(graph, &clusters.of, clusters.count);
+    // Further contraction ends where it hardly helps.
+    let of_cluster = if 2 * clusters.count < graph.len() {
+        of_graph(&coarse, parts, seed)?
+    } else {
+        graph::bisect_weighted(&coarse, parts, seed)?
+    };
     let mut part: Vec<Rank> = clusters.of.iter().map(|&cluster| of_cluster[cluster as usize]).collect();
     drop((coarse, clusters));
     refine(graph, &mut part, parts, ((1.0 + IMBALANCE) * mean).ceil() as i64);
     Ok(part)
 }
 
-/// Partitions a contracted graph; further contraction ends where it hardly helps.
-fn coarse_partition(
-    coarse: &Graph,
-    parts: u32,
-    seed: i32,
-    before: usize,
-) -> Result<Vec<Rank>, PartitionError> {
-    if is_large(coarse.len(), parts) && 2 * coarse.len() < before {
-        partition(coarse, parts, seed)
+/// Parts of a weighted graph of any size, as by [`partition`].
+///
+/// # Errors
+/// Those of METIS.
+pub(super) fn of_graph(graph: &Graph, parts: u32, seed: i32) -> Result<Vec<Rank>, PartitionError> {
+    if is_large(graph.len(), parts) {
+        partition(graph, parts, seed)
     } else {
-        graph::bisect_weighted(coarse, parts, seed)
+        graph::bisect_weighted(graph, parts, seed)
     }
 }
 

@@ -8,6 +8,7 @@
 //! keeps matrix rows that no part eliminates. So a tet that touches a periodic face only in a
 //! vertex or edge goes to a part that has a periodic face at that vertex or edge.
 
+use super::contract::{WeightedDual, contract};
 use super::dual::Dual;
 use super::weighted::Graph;
 use crate::ground::kernel::random::mix;
@@ -81,15 +82,10 @@ impl Clusters {
     /// The graph of the clusters, weighted by numbers (or weights) of tets and by numbers of faces
     /// between them.
     pub fn graph(&self, dual: &Dual, of_tets: Option<&[i32]>) -> Graph {
-        let mut weights = vec![0; self.count];
-        let weight = |tet: usize| of_tets.map_or(1, |weights| weights[tet]);
-        self.of.iter().enumerate().for_each(|(tet, &cluster)| weights[cluster as usize] += weight(tet));
-        let edges = (0..dual.len()).flat_map(|tet| {
-            let here = self.of[tet];
-            let across = dual.of(tet).iter().filter(move |&&other| other as usize > tet);
-            across.map(move |&other| [here, self.of[other as usize], 1]).filter(|[a, b, _]| a != b)
-        });
-        Graph::new(weights, edges.collect())
+        match of_tets {
+            None => contract(dual, &self.of, self.count),
+            Some(weights) => contract(&WeightedDual { dual, weights }, &self.of, self.count),
+        }
     }
 
     /// All tets of the cluster of a tet.
