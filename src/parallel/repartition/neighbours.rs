@@ -100,15 +100,25 @@ impl Neighbours {
     ) -> Result<Vec<T>, CommError> {
         let mut all = Vec::with_capacity(values.len() + self.own.len());
         all.extend_from_slice(values);
-        all.resize(values.len() + self.own.len(), T::zeroed());
-        let of = |ghosts: &Vec<u32>| ghosts.iter().map(|&ghost| values[self.own(ghost) as usize]).collect();
+        all.extend(self.ghosts(comm, |tet| values[tet as usize])?);
+        Ok(all)
+    }
+
+    /// **Collective.** The values of the ghosts, given those of the local tets next to them.
+    pub(super) fn ghosts<T: Pod>(
+        &self,
+        comm: &dyn Communicator,
+        value: impl Fn(u32) -> T,
+    ) -> Result<Vec<T>, CommError> {
+        let of = |ghosts: &Vec<u32>| ghosts.iter().map(|&ghost| value(self.own(ghost))).collect();
         let messages = self.with.iter().map(|(rank, ghosts)| (*rank, of(ghosts))).collect();
+        let mut values = vec![T::zeroed(); self.own.len()];
         for (from, received) in comm.exchange::<T>(messages)? {
             for (&ghost, value) in self.from(from).iter().zip(received) {
-                all[values.len() + ghost as usize] = value;
+                values[ghost as usize] = value;
             }
         }
-        Ok(all)
+        Ok(values)
     }
 
     /// The ghosts of a rank.

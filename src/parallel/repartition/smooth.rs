@@ -75,41 +75,57 @@ pub fn smooth(
     parts: u32,
     settings: &Settings,
 ) -> Result<(), CommError> {
-    let mut state = State { label: neighbours.with_ghosts(comm, part)?, parts, weights };
-    let mut best = state.judge(comm, neighbours)?;
-    let allowed = settings.imbalance.max(best.imbalance);
+    let tets = neighbours.tets();
+    let mut state = State::new(comm, neighbours, part, parts, weights)?;
+    let (cut, imbalance) = state.judge(comm, neighbours)?;
+    let mut best = Best { cuts: state.cuts.clone(), cut, allowed: settings.imbalance.max(imbalance) };
     let mut bonus = vec![0.0; parts as usize];
     for _ in 0..settings.rounds {
         let moved = state.spread(comm, neighbours, &mut bonus, settings.steps)?;
-        best.take(state.judge(comm, neighbours)?, allowed);
+        best.update(&state.cuts, state.judge(comm, neighbours)?);
         if !moved {
             break;
         }
     }
-    state.label = neighbours.with_ghosts(comm, &best.part)?;
+    state.cuts = best.cuts.clone();
+    let mut priorities = vec![0; best.cuts.label.len()];
     for _ in 0..settings.single_moves {
-        let moved = state.move_single(comm, neighbours, ids, allowed)?;
-        best.take(state.judge(comm, neighbours)?, allowed);
+        let moved = state.move_single(comm, neighbours, ids, &mut priorities, best.allowed)?;
+        best.update(&state.cuts, state.judge(comm, neighbours)?);
         if !moved {
             break;
         }
     }
-    *part = best.part;
+    *part = best.cuts.label;
+    part.truncate(tets);
     Ok(())
 }
 
-/// A partition with its cut and imbalance.
-struct Judged {
-    part: Vec<Rank>,
-    cut: u64,
-    imbalance: f64,
+/// A partition of the tets and ghosts.
+#[derive(Clone)]
+struct Cuts {
+    /// The part of each tet and ghost.
+    label: Vec<Rank>,
+    /// The tets with a neighbour in another part, ascending.
+    at: Vec<u32>,
+    /// The weight of the tets of each part on this rank.
+    sizes: Vec<u64>,
 }
 
-impl Judged {
-    /// Replaces `self` by a partition with a smaller cut and an allowed imbalance.
-    fn take(&mut self, other: Self, allowed: f64) {
-        if other.cut < self.cut && other.imbalance <= allowed {
-            *self = other;
+/// The partition with the smallest cut so far.
+struct Best {
+    cuts: Cuts,
+    /// The number of faces between parts.
+    cut: u64,
+    /// The largest allowed imbalance.
+    allowed: f64,
+}
+
+impl Best {
+    /// Takes another partition if its cut is smaller and its imbalance allowed.
+    fn update(&mut self, cuts: &Cuts, (cut, imbalance): (u64, f64)) {
+        if cut < self.cut && imbalance <= self.allowed {
+            (self.cuts, self.cut) = (cuts.clone(), cut);
         }
     }
 }
@@ -173,15 +189,10 @@ impl Band {
     fn spread(
         comm: &dyn Communicator,
         neighbours: &Neighbours,
-        label: &[Rank],
+        Cuts { label, at, .. }: &Cuts,
         steps: u32,
     ) -> Result<Self, CommError> {
-        let at_cut = |tet: &u32| {
-            neighbours.beside[*tet as usize]
-                .iter()
-                .any(|&n| n != NONE && label[n as usize] != label[*tet as usize])
-        };
-        let tets: Vec<u32> = (0..neighbours.tets() as u32).into_par_iter().filter(at_cut).collect();
+        let tets = at.clone();
         let mut listed = vec![false; neighbours.tets()];
         tets.iter().for_each(|&tet| listed[tet as usize] = true);
         let slot = vec![PURE; label.len()];
@@ -286,22 +297,33 @@ impl Band {
     }
 }
 
-/// The current part of each tet and ghost.
+/// The current partition.
 struct State<'a> {
-    label: Vec<Rank>,
+    cuts: Cuts,
     parts: u32,
     /// The weights of the local tets; 1 each if `None`.
     weights: Option<&'a [u32]>,
 }
 
-impl State<'_> {
-    fn weight(&self, tet: usize) -> u64 {
-        self.weights.map_or(1, |weights| weights[tet].into())
+impl<'a> State<'a> {
+    /// **Collective.**
+    fn new(
+        comm: &dyn Communicator,
+        neighbours: &Neighbours,
+        part: &[Rank],
+        parts: u32,
+        weights: Option<&'a [u32]>,
+    ) -> Result<Self, CommError> {
+        let label = neighbours.with_ghosts(comm, part)?;
+        let tets = 0..neighbours.tets() as u32;
+        let at = tets.into_par_iter().filter(|&tet| cut_faces(neighbours, &label, tet) > 0).collect();
+        let mut state = Self { cuts: Cuts { label, at, sizes: Vec::new() }, parts, weights };
+        state.cuts.sizes = state.weigh(part.iter().copied().enumerate());
+        Ok(state)
     }
 
-    /// The weight of each part on this rank.
-    fn sizes(&self, tets: usize) -> Vec<u64> {
-        self.weigh(self.label[..tets].iter().copied().enumerate())
+    fn weight(&self, tet: usize) -> u64 {
+        self.weights.map_or(1, |weights| weights[tet].into())
     }
 
     /// The weight of each part, given tets with their parts.
@@ -311,19 +333,52 @@ impl State<'_> {
         sizes
     }
 
-    /// **Collective.** The current partition with its cut and imbalance.
-    fn judge(&self, comm: &dyn Communicator, neighbours: &Neighbours) -> Result<Judged, CommError> {
-        let tets = neighbours.tets();
-        let cut = |tet: usize| {
-            let faces = neighbours.beside[tet].iter();
-            faces.filter(|&&n| n != NONE && self.label[n as usize] != self.label[tet]).count() as u64
-        };
-        let twice: u64 = (0..tets).into_par_iter().map(cut).sum();
+    /// **Collective.** The cut and the imbalance of the current partition.
+    fn judge(&self, comm: &dyn Communicator, neighbours: &Neighbours) -> Result<(u64, f64), CommError> {
+        let cut = |&tet: &u32| cut_faces(neighbours, &self.cuts.label, tet);
+        let twice: u64 = self.cuts.at.par_iter().map(cut).sum();
         let [twice] = comm.all_reduce_sum_u64([twice])?;
-        let sizes = sum_by_part(comm, &self.sizes(tets))?;
+        let sizes = sum_by_part(comm, &self.cuts.sizes)?;
         let largest = sizes.iter().copied().max().unwrap_or(0) as f64;
         let mean = sizes.iter().sum::<u64>() as f64 / f64::from(self.parts);
-        Ok(Judged { part: self.label[..tets].to_vec(), cut: twice / 2, imbalance: largest / mean })
+        Ok((twice / 2, largest / mean))
+    }
+
+    /// **Collective.** Assigns tets to parts. Returns how many local ones changed.
+    fn assign(
+        &mut self,
+        comm: &dyn Communicator,
+        neighbours: &Neighbours,
+        parts: impl Iterator<Item = (u32, Rank)>,
+    ) -> Result<u64, CommError> {
+        let tets = neighbours.tets();
+        // Cuts may be at these.
+        let mut near = std::mem::take(&mut self.cuts.at);
+        let mut changed = 0;
+        for (tet, to) in parts {
+            let weight = self.weight(tet as usize);
+            let from = std::mem::replace(&mut self.cuts.label[tet as usize], to);
+            if from == to {
+                continue;
+            }
+            changed += 1;
+            self.cuts.sizes[from as usize] -= weight;
+            self.cuts.sizes[to as usize] += weight;
+            near.push(tet);
+            near.extend(neighbours.beside[tet as usize].iter().filter(|&&n| (n as usize) < tets));
+        }
+        let label = &mut self.cuts.label;
+        let ghosts = neighbours.ghosts(comm, |tet| label[tet as usize])?;
+        for ((label, part), &own) in label[tets..].iter_mut().zip(ghosts).zip(neighbours.at_ghosts()) {
+            if std::mem::replace(label, part) != part {
+                near.push(own);
+            }
+        }
+        near.sort_unstable();
+        near.dedup();
+        near.retain(|&tet| cut_faces(neighbours, label, tet) > 0);
+        self.cuts.at = near;
+        Ok(changed)
     }
 
     /// **Collective.** One diffusion round. Returns whether enough tets moved to continue.
@@ -334,16 +389,15 @@ impl State<'_> {
         bonus: &mut [f64],
         steps: u32,
     ) -> Result<bool, CommError> {
-        let band = Band::spread(comm, neighbours, &self.label, steps)?;
-        let tets = neighbours.tets();
-        let mut outside = self.sizes(tets);
+        let band = Band::spread(comm, neighbours, &self.cuts, steps)?;
+        let mut outside = self.cuts.sizes.clone();
         for &tet in &band.tets {
-            outside[self.label[tet as usize] as usize] -= self.weight(tet as usize);
+            outside[self.cuts.label[tet as usize] as usize] -= self.weight(tet as usize);
         }
         let outside = sum_by_part(comm, &outside)?;
         let mut chosen = Vec::new();
         for _ in 0..CORRECTIONS {
-            chosen = band.choose(&self.label, bonus);
+            chosen = band.choose(&self.cuts.label, bonus);
             let in_band = band.tets.iter().map(|&tet| tet as usize).zip(chosen.iter().copied());
             let inside = sum_by_part(comm, &self.weigh(in_band))?;
             let sizes: Vec<u64> = inside.iter().zip(&outside).map(|(a, b)| a + b).collect();
@@ -357,61 +411,60 @@ impl State<'_> {
                 *bonus += 0.5 * (mean - *size as f64) / (*inside as f64 + 1.0);
             }
         }
-        let mut part = self.label[..tets].to_vec();
-        let mut moved = 0;
-        for (&tet, &to) in band.tets.iter().zip(&chosen) {
-            moved += u64::from(std::mem::replace(&mut part[tet as usize], to) != to);
-        }
-        self.label = neighbours.with_ghosts(comm, &part)?;
-        let [moved, near] = comm.all_reduce_sum_u64([moved, band.tets.len() as u64])?;
+        let changed = self.assign(comm, neighbours, band.tets.iter().copied().zip(chosen))?;
+        let [moved, near] = comm.all_reduce_sum_u64([changed, band.tets.len() as u64])?;
         Ok(moved * STILL_MOVING > near)
     }
 
     /// **Collective.** Moves tets to the part of most of their neighbours, never two neighbours in
-    /// the same round. Returns whether any moved.
+    /// the same round. Returns whether any moved. `priorities` of all tets and ghosts are 0 before
+    /// and after, except those of ghosts.
     fn move_single(
         &mut self,
         comm: &dyn Communicator,
         neighbours: &Neighbours,
         ids: &[GlobalId],
+        priorities: &mut [u64],
         allowed: f64,
     ) -> Result<bool, CommError> {
         let tets = neighbours.tets();
-        let sizes = sum_by_part(comm, &self.sizes(tets))?;
+        let sizes = sum_by_part(comm, &self.cuts.sizes)?;
         let most = allowed * sizes.iter().sum::<u64>() as f64 / f64::from(self.parts);
-        let has_room = |tet: usize, part: Rank| ((sizes[part as usize] + self.weight(tet)) as f64) < most;
-        let wish = |tet: usize| self.wish(neighbours, tet, |part| has_room(tet, part));
-        let wishes: Vec<(u64, Rank)> = (0..tets)
-            .into_par_iter()
-            .map(|tet| match wish(tet) {
-                // Larger gains first; a hash breaks ties, so that no direction is preferred.
-                Some((gain, to)) => (gain << 60 | mix(ids[tet]) >> 4 | 1, to),
-                None => (0, 0),
-            })
-            .collect();
-        let priorities: Vec<u64> = wishes.iter().map(|(priority, _)| *priority).collect();
-        let priorities = neighbours.with_ghosts(comm, &priorities)?;
-        let wins = |tet: usize| {
-            let first = |&n: &u32| n == NONE || priorities[n as usize] < priorities[tet];
-            priorities[tet] > 0 && neighbours.beside[tet].iter().all(first)
+        let has_room =
+            |tet: u32, part: Rank| ((sizes[part as usize] + self.weight(tet as usize)) as f64) < most;
+        let wish = |&tet: &u32| match self.wish(neighbours, tet, |part| has_room(tet, part)) {
+            // Larger gains first; a hash breaks ties, so that no direction is preferred.
+            Some((gain, to)) => (gain << 60 | mix(ids[tet as usize]) >> 4 | 1, to),
+            None => (0, 0),
         };
-        let winners: Vec<usize> = (0..tets).into_par_iter().filter(|&tet| wins(tet)).collect();
-        let mut part = self.label[..tets].to_vec();
-        winners.iter().for_each(|&tet| part[tet] = wishes[tet].1);
-        self.label = neighbours.with_ghosts(comm, &part)?;
-        Ok(comm.all_reduce_sum_u64([winners.len() as u64])?[0] > 0)
+        let at = &self.cuts.at;
+        let wishes: Vec<(u64, Rank)> = at.par_iter().map(wish).collect();
+        at.iter().zip(&wishes).for_each(|(&tet, (priority, _))| priorities[tet as usize] = *priority);
+        let of_ghosts = neighbours.ghosts(comm, |tet| priorities[tet as usize])?;
+        priorities[tets..].copy_from_slice(&of_ghosts);
+        let wins = |tet: u32| {
+            let own = priorities[tet as usize];
+            let first = |&n: &u32| n == NONE || priorities[n as usize] < own;
+            own > 0 && neighbours.beside[tet as usize].iter().all(first)
+        };
+        let to = at.iter().zip(&wishes).filter(|&(&tet, _)| wins(tet)).map(|(&tet, wish)| (tet, wish.1));
+        let winners: Vec<(u32, Rank)> = to.collect();
+        at.iter().for_each(|&tet| priorities[tet as usize] = 0);
+        let changed = self.assign(comm, neighbours, winners.into_iter())?;
+        Ok(comm.all_reduce_sum_u64([changed])?[0] > 0)
     }
 
     /// The part to which a tet has more neighbours than to its own, and the difference.
     fn wish(
         &self,
         neighbours: &Neighbours,
-        tet: usize,
+        tet: u32,
         has_room: impl Fn(Rank) -> bool,
     ) -> Option<(u64, Rank)> {
-        let own = self.label[tet];
-        let beside = neighbours.beside[tet];
-        let parts = || beside.iter().filter(|&&n| n != NONE).map(|&n| self.label[n as usize]);
+        let label = &self.cuts.label;
+        let own = label[tet as usize];
+        let beside = neighbours.beside[tet as usize];
+        let parts = || beside.iter().filter(|&&n| n != NONE).map(|&n| label[n as usize]);
         let count = |part: Rank| parts().filter(|&other| other == part).count();
         let here = count(own);
         let gains = parts().filter(|&part| part != own && count(part) > here && has_room(part));
@@ -419,4 +472,11 @@ impl State<'_> {
             .map(|part| ((count(part) - here) as u64, part))
             .max_by_key(|&(gain, part)| (gain, std::cmp::Reverse(part)))
     }
+}
+
+/// The number of neighbours of a tet in other parts.
+fn cut_faces(neighbours: &Neighbours, label: &[Rank], tet: u32) -> u64 {
+    let own = label[tet as usize];
+    let beside = neighbours.beside[tet as usize].iter();
+    beside.filter(|&&n| n != NONE && label[n as usize] != own).count() as u64
 }
