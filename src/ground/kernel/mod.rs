@@ -11,6 +11,7 @@ pub(crate) mod places;
 pub mod predicates;
 pub mod quality;
 pub mod random;
+pub(crate) mod sets;
 pub mod simplex;
 pub mod sphere;
 pub(crate) mod tree;

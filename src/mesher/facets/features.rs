@@ -7,7 +7,8 @@
 //! if it is short (noise); a longer one is a curve with the same patch on both sides.
 
 use super::{Settings, sharp};
-use crate::ground::projector::facets::edges::{Edges, Sets};
+use crate::ground::kernel::sets::Sets;
+use crate::ground::projector::facets::edges::Edges;
 use crate::{Point, Vector};
 
 /// The vertices of a chain of creases; a closed chain ends with its first vertex.

@@ -12,9 +12,10 @@ use super::join::{Joined, Layer};
 use super::rays::{Hit, shoot_from_point, shoot_from_triangle, tree_of};
 use super::{Facets, Marks};
 use crate::ground::kernel::predicates::{Sign, orient3d};
+use crate::ground::kernel::sets::Sets;
 use crate::ground::kernel::simplex::{area_vector, volume6};
 use crate::ground::kernel::tree::Tree;
-use crate::ground::projector::facets::edges::{Edges, Sets, Use};
+use crate::ground::projector::facets::edges::{Edges, Use};
 use crate::{Point, Vector};
 use std::cmp::Ordering;
 

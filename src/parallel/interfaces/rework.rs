@@ -4,6 +4,7 @@ use super::Settings;
 use super::merge::Merger;
 use super::renumber::{keep, places_without};
 use crate::Vector;
+use crate::ground::kernel::sets::Sets;
 use crate::ground::kernel::simplex::{from_lowest, largest_cosine};
 use crate::ground::mesh::topology::{self, Faces};
 use crate::ground::mesh::{BoundaryTriangle, Class, GlobalId, Mesh, Rank, Segment};
@@ -115,33 +116,23 @@ const NONE: u32 = u32::MAX;
 /// The region of each vertex of the given tets, connected by shared vertices, and the number of
 /// regions.
 fn components(part: &BareMesh, replaced_tets: &[(u32, Rank)]) -> (Vec<u32>, usize) {
-    let mut parent = vec![NONE; part.points.len()];
-    let root = |parent: &mut [u32], mut v: u32| {
-        while parent[v as usize] != v {
-            parent[v as usize] = parent[parent[v as usize] as usize];
-            v = parent[v as usize];
-        }
-        v
-    };
+    let (mut sets, mut is_touched) = (Sets::new(part.points.len()), vec![false; part.points.len()]);
     for &(tet, _) in replaced_tets {
-        let corners = part.tets[tet as usize].map(|v| v.0);
+        let corners = part.tets[tet as usize];
         for v in corners {
-            if parent[v as usize] == NONE {
-                parent[v as usize] = v;
-            }
-            let [a, b] = [corners[0], v].map(|v| root(&mut parent, v));
-            parent[a.max(b) as usize] = a.min(b);
+            is_touched[v.index()] = true;
+            sets.join(corners[0].0, v.0);
         }
     }
-    let (mut region, mut count) = (vec![NONE; parent.len()], 0);
-    for v in (0..parent.len() as u32).filter(|&v| parent[v as usize] != NONE).collect::<Vec<_>>() {
-        let first = root(&mut parent, v);
-        // The smallest vertex of a region is its root and comes first.
+    let (mut region, mut count) = (vec![NONE; part.points.len()], 0);
+    for v in (0..part.points.len()).filter(|&v| is_touched[v]) {
+        // The smallest vertex of a region represents it and comes first.
+        let first = sets.find(v as u32) as usize;
         if first == v {
-            region[v as usize] = count;
+            region[v] = count;
             count += 1;
         } else {
-            region[v as usize] = region[first as usize];
+            region[v] = region[first];
         }
     }
     (region, count as usize)

@@ -64,27 +64,3 @@ impl Edges {
         }
     }
 }
-
-/// Disjoint sets (union-find), represented by their smallest member.
-#[derive(Clone, Debug)]
-pub(crate) struct Sets(Vec<u32>);
-
-impl Sets {
-    pub fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    pub fn find(&mut self, mut x: u32) -> u32 {
-        while self.0[x as usize] != x {
-            let up = self.0[self.0[x as usize] as usize];
-            self.0[x as usize] = up;
-            x = up;
-        }
-        x
-    }
-
-    pub fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.find(a), self.find(b));
-        self.0[a.max(b) as usize] = a.min(b);
-    }
-}
