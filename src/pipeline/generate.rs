@@ -31,7 +31,7 @@ use crate::parallel::interfaces;
 use crate::parallel::migrate::BareStream;
 use crate::parallel::partition::ties::Ties;
 use crate::parallel::partition::{self, PartitionError};
-use crate::parallel::skin::{self, DeliveredSizes, Improvement};
+use crate::parallel::skin::{DeliveredSizes, Improvement};
 use std::sync::Arc;
 
 /// **Collective.** Generates the mesh of rank 0's model.
@@ -333,12 +333,16 @@ fn coarse_mesh(
     let sizes = (settings.method == Method::Surface)
         .then(|| skins::wanted_sizes(model, &made.mesh, &settings.coarse.size, pieces));
     let (faces, (assigned, metrics)) = progress.stage(Stage::Partition, |_| {
-        let (mesh, how) = (&made.mesh, Default::default());
+        let mesh = &made.mesh;
         let faces = partition::matched_faces(mesh)?;
         let ties = if parts > 1 { partition::periodic_ties(mesh, &faces, &map) } else { Ties::default() };
-        // Parts of the method `surface` will have the tets that the sizes require.
-        let weights = sizes.as_ref().map(|sizes| skin::expected_tets(mesh, sizes));
-        let part = partition::partition_matched(mesh, &faces, parts, &ties, weights.as_deref(), &how)?;
+        let part = match &sizes {
+            Some(sizes) => {
+                let (wanted, _) = settings.before_refinement();
+                skins::partition(mesh, (&faces, pieces), parts, &ties, (sizes, wanted))?
+            }
+            None => partition::partition_matched(mesh, &faces, parts, &ties, None, &Default::default())?,
+        };
         Ok::<_, PartitionError>((faces, part))
     })?;
     if settings.periodic_together && metrics.lost_ties > 0 {

@@ -7,11 +7,14 @@ use super::model::Model;
 use super::result::Refused;
 use super::settings::Wanted;
 use crate::ground::comm::Communicator;
-use crate::ground::mesh::Mesh;
+use crate::ground::mesh::topology::MatchedFaces;
+use crate::ground::mesh::{Mesh, Rank};
 use crate::ground::progress::{Progress, Stage};
 use crate::ground::projector::Projector;
 use crate::ground::size::{Evaluation, SizeSettings};
 use crate::parallel::distribution::{BareMesh, DistMesh};
+use crate::parallel::partition::ties::Ties;
+use crate::parallel::partition::{self, Metrics, PartitionError, metrics};
 use crate::parallel::skin::{self, DeliveredSizes, Filled, Improvement, PartSizes};
 
 /// **Collective.** Fills the skins of all parts. Coarse edges are split into `pieces`, and the
@@ -60,6 +63,40 @@ impl Refused {
             refusals.clone().next().map(|(rank, text)| (rank, String::from_utf8_lossy(text).into_owned()));
         Ok(Self { skins: refusals.count() as u64, first })
     }
+}
+
+/// The number of times that a coarse mesh is partitioned again by what its parts will have.
+const AGAIN: usize = 2;
+
+/// Partitions a coarse mesh whose edges will be split into `pieces`, such that the parts will have
+/// about as many tets. That depends on the partition, because skins are as fine as the coarse mesh,
+/// whatever the sizes: so it is made again with better weights.
+pub(super) fn partition(
+    mesh: &Mesh,
+    (faces, pieces): (&MatchedFaces, u32),
+    parts: u32,
+    ties: &Ties,
+    (sizes, wanted): (&[f64], Wanted),
+) -> Result<(Vec<Rank>, Metrics), PartitionError> {
+    let settings = partition::Settings::default();
+    let by =
+        |weights: &[f64]| partition::partition_matched(mesh, faces, parts, ties, Some(weights), &settings);
+    let expected = skin::expected_tets(mesh, sizes);
+    let scale = Goal::new(wanted, expected.iter().sum()).scale;
+    let sizes: Vec<f64> = sizes.iter().map(|size| scale * size).collect();
+    let mut made = by(&expected)?;
+    let weigh = |part: &[Rank]| skin::expected_tets_by_part(mesh, &sizes, (faces, pieces), part);
+    let mut weights = weigh(&made.0);
+    made.1.imbalance = metrics::imbalance(&made.0, parts, &weights);
+    for _ in 0..AGAIN {
+        let mut next = by(&weights)?;
+        weights = weigh(&next.0);
+        next.1.imbalance = metrics::imbalance(&next.0, parts, &weights);
+        if next.1.imbalance < made.1.imbalance {
+            made = next;
+        }
+    }
+    Ok(made)
 }
 
 /// The requested sizes at the vertices of the coarse mesh, on the rank that has it.

@@ -30,4 +30,4 @@ pub(crate) use extract::sorted_ends;
 pub use extract::{LatticeSkin, Skin, SkinTriangle, skin};
 pub use fill::{FillError, Filled, Improvement, fill, fill_or_refine};
 pub use number::number;
-pub use sizes::{PartSizes, at_vertices, expected_tets, scatter};
+pub use sizes::{PartSizes, at_vertices, expected_tets, expected_tets_by_part, scatter};
