@@ -18,7 +18,7 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::time::Instant;
 use tetmill::Point;
-use tetmill::internals::improve::improve;
+use tetmill::internals::improve::{Effort, Measure, improve};
 use tetmill::internals::volume::{ClosedSurface, VolumeMesh};
 use tetmill::internals::{UniformSize, improve, volume};
 use tetmill::mesh::{BoundaryTriangle, Class, Mesh, QualitySummary, VertexId};
@@ -122,7 +122,7 @@ fn run_apart(line: &str) {
 
 impl Case {
     fn parse(words: &[String]) -> Self {
-        let defaults = improve::Settings::default();
+        let defaults = improve::Settings::of(Effort::Standard, Measure::MeanRatio);
         let mut case = Self { surface: words[0].clone(), size: 1.0, threads: 1, settings: Some(defaults) };
         for word in &words[1..] {
             let (key, value) = word.split_once('=').unwrap_or((word, ""));
@@ -134,10 +134,10 @@ impl Case {
                 ("target", Some(s)) => s.target = number(),
                 ("change", Some(s)) => s.change_below = number(),
                 ("passes", Some(s)) => s.passes = number() as u32,
-                ("straight", Some(s)) => s.measure = improve::Measure::MeanRatio,
+                ("refined", Some(s)) => *s = improve::Settings::of(Effort::Standard, Measure::Refined),
                 ("block", Some(s)) => s.block = number() as usize,
                 _ => panic!(
-                    "{word}: size=, threads=, none, straight, target=, change=, passes= and block= are known"
+                    "{word}: size=, threads=, none, refined, target=, change=, passes= and block= are known"
                 ),
             }
         }

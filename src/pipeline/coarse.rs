@@ -4,14 +4,14 @@ use super::close::{self, CloseSurfaces, TooClose};
 use super::coarse_error::CoarseError;
 use super::coarse_mesh::{CoarseMesh, CutCusp};
 use super::expected;
-use super::fill::{SURFACE_SHARE, fill};
+use super::fill::{Improvement, SURFACE_SHARE, fill};
 use super::retries::{Budget, CORRECTIONS, Once};
 use crate::Point;
 use crate::ground::mesh::{Order, Segment, Touching};
 use crate::ground::progress::Work;
 use crate::ground::size::{GeometricSamples, GeometricSize, SizeField, SizeSettings, Source};
 use crate::ground::size::{PeriodicSize, WatchedSize};
-use crate::mesher::improve::{Effort, GeometrySmoothness, Smoothness};
+use crate::mesher::improve::{Effort, GeometrySmoothness};
 use crate::mesher::model::CsgModel;
 use crate::mesher::surface::closeness::{ThinRegions, Walls, thin_regions};
 use crate::mesher::surface::curves::{crowded, mesh_curves};
@@ -254,8 +254,9 @@ fn attempt(
         }
     }
     let smoothness = GeometrySmoothness { geometry, features };
-    let smoothness = (!settings.is_final).then_some(&smoothness as &dyn Smoothness);
-    match fill(surface, regions, &Touching::default(), size, smoothness, settings.effort) {
+    let CoarseSettings { effort, is_final, .. } = *settings;
+    let how = Improvement { effort, is_final, smoothness: Some(&smoothness) };
+    match fill(surface, regions, &Touching::default(), size, &how) {
         Ok(made) => Attempt::Made(Box::new(made)),
         Err(error) => match CloseSurfaces::unresolved(model, &initial.samples, error.places()) {
             Some(walls) => Attempt::Failed(TooClose::new(walls).into()),

@@ -364,7 +364,7 @@ mod tests {
     use crate::ground::comm::thread;
     use crate::ground::error::{ErrorKind, HasKind};
     use crate::ground::mesh::{BoundaryTriangle, Class};
-    use crate::mesher::improve::{self, Effort};
+    use crate::mesher::improve::{self, Effort, Measure};
     use crate::parallel::skin::SkinTriangle;
     use csg::PatchId;
 
@@ -416,7 +416,7 @@ mod tests {
             // Without one triangle.
             let triangles = if comm.rank() == 1 { &closed[..3] } else { &closed };
             let (skin, sizes) = unpack(&message(triangles));
-            let settings = improve::Settings::of(Effort::Quick);
+            let settings = improve::Settings::of(Effort::Quick, Measure::MeanRatio);
             let how = Improvement { settings: &settings, smoothness: None };
             let filled = comm.agree(fill(comm.rank(), &skin, &sizes, how));
             filled.map(|_| ()).unwrap_err()

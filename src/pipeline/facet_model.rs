@@ -6,7 +6,7 @@ use super::coarse_mesh::CoarseMesh;
 use super::contacts::Meeting;
 use super::error::{Error, InputError};
 use super::expected;
-use super::fill::fill;
+use super::fill::{Improvement, fill};
 use super::retries::{Budget, Once};
 use super::settings::InputSettings;
 use super::solids::{Cad, Tessellated, tessellated};
@@ -313,8 +313,10 @@ impl FacetSolid {
         }
         self.add_kept_points(&mut surface);
         self.add_kept_edges(&mut surface);
-        let smoothness = self.smoothness().filter(|_| !settings.is_final);
-        match fill(surface, regions, &touching, &size, smoothness.as_deref(), settings.effort) {
+        let smoothness = self.smoothness();
+        let CoarseSettings { effort, is_final, .. } = *settings;
+        let how = Improvement { effort, is_final, smoothness: smoothness.as_deref() };
+        match fill(surface, regions, &touching, &size, &how) {
             Ok(made) => Attempt::Made(Box::new(made)),
             Err(error) => {
                 // If triangles intersect, smaller sizes were tried already.

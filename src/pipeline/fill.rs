@@ -5,7 +5,7 @@ use super::coarse_mesh::{CoarseMesh, CoarseReport};
 use crate::Point;
 use crate::ground::mesh::{Class, Mesh, Segment, Touching, VertexId, are_sides};
 use crate::ground::size::SizeField;
-use crate::mesher::improve::{self, Effort, Smoothness};
+use crate::mesher::improve::{self, Effort, Measure, Smoothness};
 use crate::mesher::surface::SurfaceMesh;
 use crate::mesher::volume::{self, ClosedSurface};
 use crate::parallel::refine::EdgeDisplacements;
@@ -24,16 +24,33 @@ pub(super) const SURFACE_SHARE: f64 = 0.2;
 /// Fraction of the time after which the bodies are filled.
 const VOLUME_SHARE: f64 = 0.4;
 
+/// How the tets of a coarse mesh are improved.
+pub(super) struct Improvement<'a> {
+    /// By the number of tets if `None`.
+    pub effort: Option<Effort>,
+    /// Whether the mesh will be neither refined nor curved.
+    pub is_final: bool,
+    /// The smoothness of the geometry, if it is known; not used for final meshes.
+    pub smoothness: Option<&'a dyn Smoothness>,
+}
+
+impl Improvement<'_> {
+    fn apply(&self, mesh: &mut Mesh, size: &dyn SizeField) -> improve::Report {
+        let measure = if self.is_final { Measure::MeanRatio } else { Measure::Refined };
+        let effort = self.effort.unwrap_or_else(|| effort_for(mesh.tets.len()));
+        let smoothness = self.smoothness.filter(|_| !self.is_final);
+        improve::improve_for(mesh, size, smoothness, &improve::Settings::of(effort, measure))
+    }
+}
+
 /// Fills the bodies inside a surface mesh, and improves the result. `regions` returns the bodies
-/// behind and in front of a patch; bodies that touch are filled each by itself. Without
-/// `smoothness` the boundary is not moved.
+/// behind and in front of a patch; bodies that touch are filled each by itself.
 pub(super) fn fill(
     surface: SurfaceMesh,
     regions: impl Fn(PatchId) -> [Option<BodyId>; 2],
     touching: &Touching,
     size: &dyn SizeField,
-    smoothness: Option<&dyn Smoothness>,
-    effort: Option<Effort>,
+    how: &Improvement,
 ) -> Result<CoarseMesh, CoarseError> {
     size.work().proceed()?;
     size.work().step(SURFACE_SHARE, VOLUME_SHARE, 1);
@@ -44,8 +61,7 @@ pub(super) fn fill(
     let (mut mesh, volume) = fill_bodies(surface, regions, touching, size)?;
     size.work().proceed()?;
     size.work().step(VOLUME_SHARE, 1.0, 1);
-    let settings = improve::Settings::of(effort.unwrap_or_else(|| effort_for(mesh.tets.len())));
-    let improved = improve::improve_for(&mut mesh, size, smoothness, &settings);
+    let improved = how.apply(&mut mesh, size);
     size.work().proceed()?;
     let report = CoarseReport {
         vertices: mesh.points.len() as u64,

@@ -24,7 +24,7 @@ use crate::ground::mesh::{Mesh, Names, Order};
 use crate::ground::progress::{Progress, Stage};
 use crate::ground::projector::Projector;
 use crate::ground::size::Source;
-use crate::mesher::improve::{self, Effort, Smoothness};
+use crate::mesher::improve::{self, Effort, Measure, Smoothness};
 use crate::mesher::smoothness::smoothness;
 use crate::parallel::distribution::{self, BareMesh, DistMesh, number_shared};
 use crate::parallel::interfaces;
@@ -190,9 +190,19 @@ fn fill(
     stored(comm, part, whole, merge_angle, settings, progress)
 }
 
-/// How carefully the tets of separately meshed parts are improved.
+/// How the tets of separately meshed parts are improved.
 fn of_effort(settings: &GenerateSettings) -> improve::Settings {
-    improve::Settings::of(settings.coarse.effort.unwrap_or(Effort::Standard))
+    improve::Settings::of(settings.coarse.effort.unwrap_or(Effort::Standard), measure(settings))
+}
+
+/// Whether separately meshed parts will be refined or curved.
+fn are_refined(settings: &GenerateSettings) -> bool {
+    settings.refine > 0 || settings.coarse.order == Order::Second
+}
+
+/// The shape measure of the tets of separately meshed parts.
+fn measure(settings: &GenerateSettings) -> Measure {
+    if are_refined(settings) { Measure::Refined } else { Measure::MeanRatio }
 }
 
 /// The smoothness of the geometry, if separately meshed parts will be refined or curved.
@@ -200,8 +210,7 @@ fn smoothness_if_refined<'a>(
     settings: &GenerateSettings,
     projector: &'a Projector,
 ) -> Option<Box<dyn Smoothness + 'a>> {
-    let are_refined = settings.refine > 0 || settings.coarse.order == Order::Second;
-    are_refined.then(|| smoothness(projector)).flatten()
+    are_refined(settings).then(|| smoothness(projector)).flatten()
 }
 
 /// **Collective.** Meshes the pieces of the geometry.
@@ -219,7 +228,7 @@ fn decomposed(
         decompose::mesh_pieces(comm, model, cuts, settings, how, progress)?
     };
     let whole = Whole { model, names, projector, pieces, coarse, refused: None, delivered };
-    stored(comm, part, whole, interfaces::Settings::default().merge_angle, settings, progress)
+    stored(comm, part, whole, Some(interfaces::MERGE_ANGLE), settings, progress)
 }
 
 /// Data that accompanies separately meshed parts.
@@ -247,7 +256,7 @@ fn stored(
     let linked = Linked::broadcast(comm, coarse.as_ref().map(|made| &made.periodic))?;
     let (part, across) = progress.stage(Stage::Interfaces, |_| {
         let smoothness = smoothness_if_refined(settings, &projector);
-        let across = interfaces::Settings { merge_angle, ..interfaces::Settings::default() };
+        let across = interfaces::Settings { merge_angle, ..interfaces::Settings::of(measure(settings)) };
         interfaces::improve_across(comm, part, linked.links(), &across, smoothness.as_deref())
     })?;
     let (part, evened) = even_out(comm, part, linked.links(), progress)?;

@@ -57,7 +57,7 @@ impl Default for InsertionSteps {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self::of(Effort::default())
+        Self::of(Effort::default(), Measure::default())
     }
 }
 
@@ -100,20 +100,34 @@ impl std::str::FromStr for Effort {
 }
 
 impl Settings {
-    /// The settings of an effort.
-    pub fn of(effort: Effort) -> Self {
-        let (passes, target, reconnection_steps) = match effort {
-            Effort::Quick => (1, 0.7, 0),
-            Effort::Standard => (3, 0.8, 4_000),
-            Effort::Careful => (8, 0.85, 4_000),
-            Effort::Thorough => (8, 0.9, 40_000),
+    /// The settings of an effort and a measure: [`Measure::Refined`] for meshes that will be
+    /// refined, [`Measure::MeanRatio`] for others.
+    ///
+    /// Meshes that are not refined get better angles by their own mean ratio, in the same time
+    /// (benches/results/measure-2026-11-29.md). Its targets are lower, because a sliver's mean
+    /// ratio is 6/7 of its other measure.
+    pub fn of(effort: Effort, measure: Measure) -> Self {
+        let (passes, reconnection_steps) = match effort {
+            Effort::Quick => (1, 0),
+            Effort::Standard => (3, 4_000),
+            Effort::Careful => (8, 4_000),
+            Effort::Thorough => (8, 40_000),
         };
-        let measure = Measure::default();
+        let (target, change_below) = match (measure, effort) {
+            (Measure::Refined, Effort::Quick) => (0.7, 0.6),
+            (Measure::Refined, Effort::Standard) => (0.8, 0.6),
+            (Measure::Refined, Effort::Careful) => (0.85, 0.6),
+            (Measure::Refined, Effort::Thorough) => (0.9, 0.6),
+            (Measure::MeanRatio, Effort::Quick) => (0.65, 0.5),
+            (Measure::MeanRatio, Effort::Standard) => (0.75, 0.5),
+            (Measure::MeanRatio, Effort::Careful) => (0.78, 0.5),
+            (Measure::MeanRatio, Effort::Thorough) => (0.85, 0.6),
+        };
         Self {
             measure,
             passes,
             target,
-            change_below: 0.6,
+            change_below,
             shortest_edge: 0.6,
             insertion_steps: InsertionSteps::default(),
             reconnection_steps,

@@ -89,7 +89,7 @@ fn a_shaken_cube_gets_good_angles_and_keeps_its_boundary() {
 fn interfaces_between_bodies_stay() {
     let before = two_boxes(6, 1);
     let mut mesh = before.clone();
-    let report = improve(&mut mesh, &UniformSize(0.4), &Settings::of(Effort::Thorough));
+    let report = improve(&mut mesh, &UniformSize(0.4), &Settings::of(Effort::Thorough, Measure::Refined));
     check(&before, &mesh, &report);
     assert!(report.after.smallest_dihedral > 25.0, "{:?}", report.after);
 }
@@ -179,7 +179,7 @@ fn blocks_leave_no_bad_tets_at_their_seams() {
     for block in [500, 2000] {
         let before = two_boxes(8, 1);
         let mut mesh = before.clone();
-        let settings = Settings { block, ..Settings::of(Effort::Thorough) };
+        let settings = Settings { block, ..Settings::of(Effort::Thorough, Measure::Refined) };
         let report = improve(&mut mesh, &UniformSize(0.3), &settings);
         check(&before, &mesh, &report);
         assert!(report.after.smallest_dihedral > 25.0, "{:?}", report.after);
@@ -211,13 +211,13 @@ fn a_boundary_triangle_off_the_tets_is_refused() {
 
 #[test]
 fn more_effort_gives_better_angles() {
-    let ends: Vec<f64> = [Effort::Quick, Effort::Standard, Effort::Careful]
-        .map(|effort| {
+    for measure in [Measure::MeanRatio, Measure::Refined] {
+        let ends = [Effort::Quick, Effort::Standard, Effort::Careful].map(|effort| {
             let mut mesh = cube(8, 3);
-            improve(&mut mesh, &UniformSize(0.3), &Settings::of(effort)).after.first_percentile
-        })
-        .to_vec();
-    assert!(ends.is_sorted(), "{ends:?}");
+            improve(&mut mesh, &UniformSize(0.3), &Settings::of(effort, measure)).after.first_percentile
+        });
+        assert!(ends.is_sorted(), "{measure:?}: {ends:?}");
+    }
 }
 
 #[test]

@@ -11,12 +11,9 @@ use crate::parallel::distribution::BareMesh;
 /// improved before.
 const NEAR: usize = 2;
 
-/// Layers of tets around a bad one that belong to its region.
-const LAYERS: usize = 2;
-
-/// Touching regions merge within this many layers of the tet that gives the region its label; the
-/// rest is left to the next round.
-const REACH: usize = 8;
+/// Labels spread by this many layers, so touching regions merge within this many layers of the tet
+/// that gives the region its label; the rest is left to the next round.
+const REACH: usize = 7;
 
 /// The label of a region: a random number, and the rank that improves the region. The smallest
 /// label wins.
@@ -55,10 +52,12 @@ pub(super) fn bad_tets(mesh: &BareMesh, angle: f64) -> Vec<u32> {
     (0..mesh.tets.len() as u32).filter(is_bad).collect()
 }
 
-/// **Collective.** Regions of [`LAYERS`] layers around the bad tets, without the `fixed` ones.
+/// **Collective.** Regions: the bad tets and those that touch them, without the `fixed` ones.
 ///
 /// Each bad tet has a random label, computed from its id and the `round`; labels spread over
-/// vertices, and the smallest wins.
+/// vertices, and the smallest wins. With a second layer around the bad tets, regions have 2.4 times
+/// as many tets and take twice the time, and the 1st percentile of the angles is at most 0.4°
+/// higher (benches/results/measure-2026-11-29.md).
 pub(super) fn around(
     comm: &dyn Communicator,
     mesh: &BareMesh,
@@ -74,13 +73,9 @@ pub(super) fn around(
         }
     }
     share(comm, mesh, &mut labels)?;
-    for _ in 1..LAYERS {
-        let all = 0..mesh.tets.len();
-        spread(comm, mesh, all, &mut labels)?;
-    }
     let is_near = |tet: &[VertexId; 4]| tet.iter().any(|v| labels[v.index()] != NONE);
     let inside: Vec<bool> = mesh.tets.iter().zip(fixed).map(|(tet, &fixed)| !fixed && is_near(tet)).collect();
-    for _ in LAYERS..REACH {
+    for _ in 0..REACH {
         let of_regions = (0..mesh.tets.len()).filter(|&tet| inside[tet]);
         spread(comm, mesh, of_regions, &mut labels)?;
     }
