@@ -119,7 +119,7 @@ impl Settings {
             (Measure::Refined, Effort::Careful) => (0.85, 0.6),
             (Measure::Refined, Effort::Thorough) => (0.9, 0.6),
             (Measure::MeanRatio, Effort::Quick) => (0.65, 0.5),
-            (Measure::MeanRatio, Effort::Standard) => (0.75, 0.5),
+            (Measure::MeanRatio, Effort::Standard) => (0.72, 0.5),
             (Measure::MeanRatio, Effort::Careful) => (0.78, 0.5),
             (Measure::MeanRatio, Effort::Thorough) => (0.85, 0.6),
         };
