@@ -81,7 +81,7 @@ const BUDGETS: [&str; 8] = [
     "target=0.65 passes=1",
     "target=0.72 passes=3",
     "target=0.78 passes=8",
-    "target=0.85 passes=8",
+    "target=0.8 passes=8",
 ];
 
 fn header() -> String {
