@@ -306,7 +306,7 @@ struct State<'a> {
 }
 
 impl<'a> State<'a> {
-    /// **Collective.**
+    /// **Collective.** The state of the partition `part`.
     fn new(
         comm: &dyn Communicator,
         neighbours: &Neighbours,

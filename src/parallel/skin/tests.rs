@@ -3,7 +3,7 @@
 use super::*;
 use crate::Point;
 use crate::ground::comm::thread;
-use crate::ground::mesh::{Class, GlobalId, Rank};
+use crate::ground::mesh::{Class, GlobalId, Rank, topology};
 use crate::ground::size::{SizeField, UniformSize};
 use crate::mesher::improve::Settings;
 use crate::parallel::check::{Checksum, PartReport, check, checksum_of_all};
@@ -143,6 +143,27 @@ fn sizes_are_linear_between_the_vertices_and_fit_the_mesh_in_the_mean() {
     assert!(field.windows(2).all(|pair| pair[0] == pair[1]));
     let mean = |sizes: &[f64]| sizes.iter().map(|s| s.ln()).sum::<f64>() / sizes.len() as f64;
     assert!((mean(&flat) - mean(&field)).abs() < 1e-12);
+}
+
+#[test]
+fn coarse_tets_count_for_the_triangles_of_their_skins() {
+    let mesh = cube(3, false).mesh;
+    let (sizes, tets) = (vec![0.1; mesh.points.len()], mesh.tets.len());
+    let faces = topology::matched_faces(mesh.points.len(), &mesh.tets).expect("a mesh");
+    let by = |part: &[Rank], pieces| expected_tets_by_part(&mesh, &sizes, (&faces, pieces), part);
+    let sum = |counts: &[f64]| counts.iter().sum::<f64>();
+    let inside = expected_tets(&mesh, &sizes);
+    let outer = |tet: usize| {
+        faces.listed.tet_faces[tet].iter().filter(|face| faces.tets[face.index()][1] == u32::MAX).count()
+    };
+    let one = by(&vec![0; tets], 8);
+    assert!((0..tets).any(|tet| outer(tet) == 0) && (0..tets).any(|tet| outer(tet) > 1));
+    for tet in 0..tets {
+        assert_eq!(one[tet] > inside[tet], outer(tet) > 0, "8 pieces of 1/3 are finer than 0.1");
+    }
+    let alone: Vec<Rank> = (0..tets as Rank).collect();
+    assert!(sum(&by(&alone, 8)) > 2.0 * sum(&one), "each face is on two skins");
+    assert!(sum(&by(&alone, 1)) < sum(&inside) && by(&alone, 1).iter().all(|count| *count > 0.0));
 }
 
 #[test]
