@@ -65,8 +65,8 @@ impl Refused {
     }
 }
 
-/// The number of times that a coarse mesh is partitioned again by what its parts will have.
-const AGAIN: usize = 2;
+/// The number of partitions of a coarse mesh, each by what the parts of the one before will have.
+const TRIES: usize = 3;
 
 /// Partitions a coarse mesh whose edges will be split into `pieces`, such that the parts will have
 /// about as many tets. That depends on the partition, because skins are as fine as the coarse mesh,
@@ -78,25 +78,21 @@ pub(super) fn partition(
     ties: &Ties,
     (sizes, wanted): (&[f64], Wanted),
 ) -> Result<(Vec<Rank>, Metrics), PartitionError> {
-    let settings = partition::Settings::default();
-    let by =
-        |weights: &[f64]| partition::partition_matched(mesh, faces, parts, ties, Some(weights), &settings);
-    let expected = skin::expected_tets(mesh, sizes);
-    let scale = Goal::new(wanted, expected.iter().sum()).scale;
+    let mut weights = skin::expected_tets(mesh, sizes);
+    let scale = Goal::new(wanted, weights.iter().sum()).scale;
     let sizes: Vec<f64> = sizes.iter().map(|size| scale * size).collect();
-    let mut made = by(&expected)?;
-    let weigh = |part: &[Rank]| skin::expected_tets_by_part(mesh, &sizes, (faces, pieces), part);
-    let mut weights = weigh(&made.0);
-    made.1.imbalance = metrics::imbalance(&made.0, parts, &weights);
-    for _ in 0..AGAIN {
-        let mut next = by(&weights)?;
-        weights = weigh(&next.0);
-        next.1.imbalance = metrics::imbalance(&next.0, parts, &weights);
-        if next.1.imbalance < made.1.imbalance {
-            made = next;
+    let settings = partition::Settings::default();
+    let mut best: Option<(Vec<Rank>, Metrics)> = None;
+    for _ in 0..if parts > 1 { TRIES } else { 1 } {
+        let made = partition::partition_matched(mesh, faces, parts, ties, Some(&weights), &settings);
+        let (part, mut metrics) = made?;
+        weights = skin::expected_tets_by_part(mesh, &sizes, (faces, pieces), &part);
+        metrics.imbalance = metrics::imbalance(&part, parts, &weights);
+        if best.as_ref().is_none_or(|(_, best)| metrics.imbalance < best.imbalance) {
+            best = Some((part, metrics));
         }
     }
-    Ok(made)
+    Ok(best.expect("there is a first partition"))
 }
 
 /// The requested sizes at the vertices of the coarse mesh, on the rank that has it.
