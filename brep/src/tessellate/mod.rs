@@ -13,6 +13,7 @@ mod measure;
 mod orient;
 mod outline;
 mod overlap;
+mod refine;
 mod reuse;
 mod tangent;
 
