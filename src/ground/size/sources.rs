@@ -4,6 +4,7 @@ use super::lattice::Lattice;
 use crate::Point;
 use csg::Aabb;
 use rayon::prelude::*;
+use rustc_hash::FxHashMap as HashMap;
 use std::ops::Range;
 
 /// A point with a prescribed size: at distance d from it, the size is at most `size + grading·d`.
@@ -242,14 +243,29 @@ pub(super) struct Start {
 /// A source is in the grid whose cell width is its size rounded down to a power of two. Facets may
 /// be much smaller than their sizes, and both sides of a thin region have the same sizes.
 pub(crate) fn thinned(sources: Vec<Source>) -> Vec<Source> {
-    let keyed = |s: Source| {
+    /// Fewer sources are thinned by one thread.
+    const AT_ONCE: usize = 1 << 15;
+    type Cells = HashMap<(i32, [i64; 3]), Source>;
+    let cell_of = |s: &Source| {
         let level = s.size.log2().floor();
         let width = level.exp2();
-        let cell = [s.point.x, s.point.y, s.point.z].map(|x| (x / width).floor() as i64);
-        (level as i32, cell, s)
+        (level as i32, [s.point.x, s.point.y, s.point.z].map(|x| (x / width).floor() as i64))
     };
-    let mut keyed: Vec<_> = sources.into_par_iter().map(keyed).collect();
-    keyed.par_sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.size.total_cmp(&b.2.size)));
-    keyed.dedup_by_key(|(level, cell, _)| (*level, *cell));
-    keyed.into_iter().map(|(_, _, source)| source).collect()
+    let add = |cells: &mut Cells, cell: (i32, [i64; 3]), source: Source| {
+        let kept = cells.entry(cell).or_insert(source);
+        if source.size < kept.size {
+            *kept = source;
+        }
+    };
+    let of_chunk = |sources: &[Source]| {
+        let mut cells = Cells::default();
+        sources.iter().for_each(|source| add(&mut cells, cell_of(source), *source));
+        cells
+    };
+    let mut chunks = sources.par_chunks(AT_ONCE).map(of_chunk).collect::<Vec<_>>().into_iter();
+    let mut cells = chunks.next().unwrap_or_default();
+    chunks.flatten().for_each(|(cell, source)| add(&mut cells, cell, source));
+    let mut cells: Vec<_> = cells.into_iter().collect();
+    cells.par_sort_unstable_by_key(|(cell, _)| *cell);
+    cells.into_iter().map(|(_, source)| source).collect()
 }
