@@ -9,7 +9,6 @@ use crate::ground::size::{SizeSettings, Source, Sources, thinned};
 use crate::mesher::surface::closeness::lowered;
 use csg::PatchId;
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// Largest edge length, in distances of two curves: a strip of such triangles, one across, has
 /// angles of at least 25°.
@@ -40,20 +39,22 @@ pub(super) fn sample(model: &FacetModel, settings: &SizeSettings, maximum: f64, 
     if others.iter().all(Vec::is_empty) {
         return;
     }
-    let segments = Segments::new(model);
+    let lines = Lines::new(model);
     let alone = Sources::new(settings.grading, maximum, &thinned(sources.clone()));
+    let across = ACROSS * settings.scale.min(1.0);
     let of_curve = |related: &mut Vec<bool>, c: usize| {
         let mut added = Vec::new();
         if others[c].is_empty() {
             return added;
         }
         others[c].iter().for_each(|&d| related[d] = true);
-        let sizes = |p: &Point| Sizes {
-            alone: alone.size_at(p),
-            wanted: (ACROSS * settings.scale.min(1.0) * segments.distance(p, related)).max(settings.minh),
+        let sizes = |p: &Point, most: &dyn Fn(f64) -> f64| {
+            let alone = alone.size_at(p);
+            let distance = lines.distance(p, related, most(alone) / across);
+            Sizes { alone, wanted: (across * distance).max(settings.minh) }
         };
-        for (_, [a, b]) in &segments.all[segments.of_curve[c].clone()] {
-            cut(*a, *b, MOST_CUTS, &sizes, &mut added);
+        for w in lines.all[c].points.windows(2) {
+            cut(w[0], w[1], MOST_CUTS, &sizes, &mut added);
         }
         others[c].iter().for_each(|&d| related[d] = false);
         added
@@ -63,34 +64,47 @@ pub(super) fn sample(model: &FacetModel, settings: &SizeSettings, maximum: f64, 
     sources.extend(added.concat());
 }
 
-/// The segments of all curves.
-struct Segments {
-    /// Each with its curve.
-    all: Vec<(usize, [Point; 2])>,
-    of_curve: Vec<Range<usize>>,
+/// All curves as polylines.
+struct Lines {
+    all: Vec<Line>,
+    /// Of their boxes.
     tree: Tree,
 }
 
-impl Segments {
+struct Line {
+    points: Vec<Point>,
+    /// Of its segments.
+    tree: Tree,
+}
+
+impl Lines {
     fn new(model: &FacetModel) -> Self {
-        let (mut all, mut of_curve) = (Vec::new(), Vec::new());
-        let point = |v: u32| model.points[v as usize];
-        for (c, curve) in model.curves.iter().enumerate() {
-            let first = all.len();
-            all.extend(curve.vertices.windows(2).map(|w| (c, [point(w[0]), point(w[1])])));
-            of_curve.push(first..all.len());
-        }
-        let tree = Tree::new(&all.iter().map(|(_, ends)| bounds(ends)).collect::<Vec<_>>());
-        Self { all, of_curve, tree }
+        let line = |curve: &FacetCurve| {
+            let points: Vec<Point> = curve.vertices.iter().map(|&v| model.points[v as usize]).collect();
+            let tree = Tree::new(&points.windows(2).map(bounds).collect::<Vec<_>>());
+            Line { points, tree }
+        };
+        let all: Vec<Line> = model.curves.iter().map(line).collect();
+        let tree = Tree::new(&all.iter().map(|line| bounds(&line.points)).collect::<Vec<_>>());
+        Self { all, tree }
     }
 
-    /// The distance from the nearest of some curves; infinite without any.
-    fn distance(&self, p: &Point, is_of_them: &[bool]) -> f64 {
-        let to = |s: u32| {
-            let (curve, [a, b]) = &self.all[s as usize];
-            if is_of_them[*curve] { in_segment(p, a, b).1 } else { f64::INFINITY }
+    /// The distance from the nearest of some curves; infinite if that is more than `most`.
+    ///
+    /// Segments of all curves in one tree would be visited in vain near those of other curves.
+    fn distance(&self, p: &Point, is_of_them: &[bool], most: f64) -> f64 {
+        let mut least = most * most;
+        let to = |curve: u32| {
+            if !is_of_them[curve as usize] {
+                return f64::INFINITY;
+            }
+            let Line { points, tree } = &self.all[curve as usize];
+            let to = |s: u32| in_segment(p, &points[s as usize], &points[s as usize + 1]).1;
+            let Some((_, squared)) = tree.nearest_within(p, least, to) else { return f64::INFINITY };
+            least = squared;
+            squared
         };
-        self.tree.nearest(p, to).map_or(f64::INFINITY, |(_, squared)| squared.sqrt())
+        self.tree.nearest_within(p, most * most, to).map_or(f64::INFINITY, |(_, squared)| squared.sqrt())
     }
 }
 
@@ -104,12 +118,22 @@ struct Sizes {
 
 /// Adds a source in the middle of a segment, which is bisected while it is longer than the size
 /// there.
-fn cut(a: Point, b: Point, cuts: u32, sizes: &impl Fn(&Point) -> Sizes, sources: &mut Vec<Source>) {
+///
+/// `sizes` also gets the limit, as a function of the size alone, from which on wanted sizes have no
+/// effect.
+fn cut(
+    a: Point,
+    b: Point,
+    cuts: u32,
+    sizes: &impl Fn(&Point, &dyn Fn(f64) -> f64) -> Sizes,
+    sources: &mut Vec<Source>,
+) {
     let (middle, length) = (nalgebra::center(&a, &b), (b - a).norm());
-    let Sizes { alone, wanted } = sizes(&middle);
     // Along the segment the distance changes by at most half its length, and the other size hardly
     // by more.
-    if wanted - 0.5 * ACROSS * length >= alone + 0.5 * length {
+    let most = |alone: f64| alone + 0.5 * length + 0.5 * ACROSS * length;
+    let Sizes { alone, wanted } = sizes(&middle, &most);
+    if wanted >= most(alone) {
         return;
     }
     let size = lowered(alone, wanted, MOST);
