@@ -15,6 +15,8 @@ use std::time::Instant;
 pub enum Stage {
     /// Reading a geometry, a surface or a mesh, and finding the features of a geometry.
     Read,
+    /// Merging small faces and edges of a CAD file.
+    Merge,
     /// Making the coarse mesh.
     Mesh,
     /// Choosing planes through the geometry, and cutting it.
@@ -52,6 +54,7 @@ impl Stage {
     pub fn name(self) -> &'static str {
         match self {
             Self::Read => "read",
+            Self::Merge => "merge",
             Self::Mesh => "mesh",
             Self::Cut => "cut",
             Self::Surface => "surface",

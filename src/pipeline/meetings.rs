@@ -10,11 +10,6 @@ use csg::PatchId;
 use std::sync::{Mutex, PoisonError};
 
 impl FacetSolid {
-    /// Whether solids of a CAD file overlap: no small face that is merged changes that.
-    pub(super) fn has_overlapping_solids(&self) -> bool {
-        self.overlap.is_some()
-    }
-
     /// The error for solids that overlap, or facets that intersect where no finer facets would keep
     /// them apart.
     pub(super) fn deep_meeting(&self) -> Option<CoarseError> {

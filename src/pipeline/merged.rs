@@ -11,7 +11,7 @@ use super::result::Generated;
 use super::settings::{GenerateSettings, Wanted};
 use crate::ground::comm::Communicator;
 use crate::ground::error::{ErrorKind, HasKind};
-use crate::ground::progress::Progress;
+use crate::ground::progress::{Progress, Stage};
 use crate::mesher::facets::MergedSmall;
 
 /// **Collective.** Makes the mesh; only rank 0 needs the geometry and reports `progress`.
@@ -33,9 +33,7 @@ pub fn generate(
     comm.agree(options::refuse_impossible(settings))?;
     let model = geometry.filter(|_| comm.rank() == 0).map(|geometry| &geometry.model);
     let (merged, report) = match model {
-        Some(Model::Facets(solid)) if !solid.has_overlapping_solids() => {
-            merge_small(solid, settings, progress)
-        }
+        Some(Model::Facets(solid)) if solid.may_be_merged() => merge_small(solid, settings, progress),
         _ => (None, MergedSmall::default()),
     };
     let (mut made, is_merged) = of_merged(comm, merged.as_ref(), model, settings, progress)?;
@@ -95,7 +93,8 @@ fn merge_small(
     };
     // Nodes of second order divide edges, too.
     let pieces = pieces * settings.coarse.order.degree();
-    let (merged, report) = solid.merge_small(&settings.coarse.size, largest, pieces);
+    let (merged, report) =
+        progress.stage(Stage::Merge, |work| solid.merge_small(&settings.coarse.size, largest, pieces, work));
     report.notes().iter().for_each(|text| progress.note(text));
     (merged.map(|solid| Model::Facets(Box::new(solid))), report)
 }

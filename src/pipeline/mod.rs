@@ -38,6 +38,7 @@ mod room;
 pub mod room_error;
 pub mod settings;
 mod skins;
+mod small;
 mod solids;
 pub mod target;
 mod verify;

@@ -6,11 +6,13 @@ use crate::Vector;
 use crate::ground::kernel::tree;
 use crate::ground::mesh::{BoundaryTriangle, Touching, VertexId};
 use crate::ground::projector::BrepProjector;
-use crate::ground::projector::facets::{FacetProjector, NO_PATCH, Source};
+use crate::ground::projector::facets::edges::Edges;
+use crate::ground::projector::facets::{FacetProjector, NO_PATCH, PatchFacets, Source};
 use brep::{Curve, Model, On, Tessellation};
 use csg::{BodyId, CornerId, PatchId};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// The normals on both sides of a seam differ by at most this angle (radians), else it is an edge.
 const SMOOTH: f64 = 0.02;
@@ -29,6 +31,10 @@ pub(super) struct Shape {
     triangles: Vec<[u32; 3]>,
     /// The unit normals at their corners.
     normals: Vec<[Vector; 3]>,
+    /// The edges of the triangles.
+    edges: Edges,
+    /// The facets of each face.
+    facets: Vec<Arc<PatchFacets>>,
     /// The edges that are curves.
     pub curves: Vec<usize>,
     /// The vertices that are corners, ascending.
@@ -51,7 +57,16 @@ impl Shape {
         };
         let triangles: Vec<[u32; 3]> = tessellation.triangles.iter().map(oriented).collect();
         let corners = corners(model, &curves, &triangles, &normals);
-        Self { is_reversed, triangles, normals, curves, corners }
+        let edges = Edges::new(&triangles);
+        let source = Source {
+            points: tessellation.points.clone(),
+            triangles,
+            patch_of: tessellation.triangles.iter().map(|t| t.patch).collect(),
+            patches: model.patches.len() as u32,
+            ..Source::default()
+        };
+        let facets = FacetProjector::facets_of(&source, &normals, &edges);
+        Self { is_reversed, triangles: source.triangles, normals, edges, facets, curves, corners }
     }
 
     /// Each face a patch, and each edge a curve.
@@ -84,11 +99,24 @@ fn inaccuracy(model: &Model, face: usize) -> f64 {
 /// its shape: both come from the parametrisation alone.
 pub fn of_brep(model: &Model, tessellation: &Tessellation) -> (FacetModel, BrepProjector) {
     let shape = Shape::new(model, tessellation);
-    grouped(model, tessellation, &shape, &shape.ungrouped(model), &[])
+    let grouping = shape.ungrouped(model);
+    let facets = grouped(model, tessellation, &shape, &grouping, &[]);
+    (facets, exact(model, tessellation, &shape, &grouping))
 }
 
-/// The same with groups of faces and edges as patches and curves, and ends of faces without
-/// influence on sizes.
+/// The exact faces and edges of a model, in the groups that are patches and curves.
+pub(super) fn exact(
+    model: &Model,
+    tessellation: &Tessellation,
+    shape: &Shape,
+    grouping: &Grouping,
+) -> BrepProjector {
+    let Grouping { patches, curves, is_short, .. } = grouping;
+    BrepProjector::new(model, tessellation, &shape.is_reversed, patches, curves, is_short)
+}
+
+/// Takes the tessellation of a model as facets with groups of faces and edges as patches and
+/// curves, and ends of faces without influence on sizes.
 ///
 /// Facets of faces that joined a main face belong to its patch, but have no influence on its shape
 /// and size: points are projected to the facets of the main face alone.
@@ -98,10 +126,9 @@ pub(super) fn grouped(
     shape: &Shape,
     grouping: &Grouping,
     blunt: &[BluntEnd],
-) -> (FacetModel, BrepProjector) {
-    let Shape { is_reversed, triangles, normals, .. } = shape;
-    let Grouping { patches: faces_of, curves: edges_of, is_short, .. } = grouping;
-    let exact = BrepProjector::new(model, tessellation, is_reversed, faces_of, edges_of, is_short);
+) -> FacetModel {
+    let Shape { is_reversed, triangles, normals, edges, facets, .. } = shape;
+    let faces_of = &grouping.patches;
     let mut patch_of_face = vec![0; model.patches.len()];
     let mut is_main = vec![false; model.patches.len()];
     for (patch, faces) in grouping.patches.iter().enumerate() {
@@ -138,11 +165,14 @@ pub(super) fn grouped(
         let source = Source { patch_of, ..source.clone() };
         Merged {
             is_merged: faces().map(|face| !is_main[face]).collect(),
-            projector: FacetProjector::with_normals(source, Some(normals)),
+            projector: FacetProjector::with_normals(source, normals, edges, |patch| {
+                let is_single = faces_of[patch].len() == 1;
+                is_single.then(|| facets[faces_of[patch][0]].clone())
+            }),
         }
     });
     let bounds = tree::bounds(&tessellation.points);
-    let facets = FacetModel {
+    FacetModel {
         points: tessellation.points.clone(),
         triangles: triangles
             .iter()
@@ -158,27 +188,39 @@ pub(super) fn grouped(
         bodies: vec![FacetBody { file: 0, number: None }; model.bodies],
         rounding: ROUNDING * bounds.min.coords.amax().max(bounds.max.coords.amax()),
         bounds,
-        projector: FacetProjector::with_normals(source, Some(normals)),
+        // Those of the main face: no others are of the patch here.
+        projector: FacetProjector::with_normals(source, normals, edges, |patch| {
+            Some(facets[faces_of[patch][0]].clone())
+        }),
         merged,
         touching: Touching::default(),
         blunt: blunt
             .iter()
             .map(|end| BluntEnd { patch: patch_of_face[end.patch] as usize, ..*end })
             .collect(),
-    };
-    (facets, exact)
+    }
 }
 
 /// The unit normals at the corners of all triangles, outward; those of the triangles at poles.
 /// Their order is that of the oriented triangles.
 fn corner_normals(model: &Model, tessellation: &Tessellation, is_reversed: &[bool]) -> Vec<[Vector; 3]> {
+    let at = |patch: u32, [u, v]: [f64; 2]| model.patches[patch as usize].surface.jet(u, v, 1).normal();
+    // Six triangles have each vertex inside of a patch, nearly always with the same parameters.
+    let mut uses = vec![None; tessellation.points.len()];
+    for t in &tessellation.triangles {
+        for (&v, parameters) in t.vertices.iter().zip(t.parameters) {
+            uses[v as usize].get_or_insert((t.patch, parameters));
+        }
+    }
+    let normals: Vec<Option<Vector>> =
+        uses.par_iter().map(|used| used.and_then(|(patch, parameters)| at(patch, parameters))).collect();
     let of = |t: &brep::Triangle| {
         let sign = if is_reversed[t.patch as usize] { -1.0 } else { 1.0 };
-        let surface = &model.patches[t.patch as usize].surface;
         let [a, b, c] = t.vertices.map(|v| tessellation.points[v as usize]);
         let flat = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(Vector::z);
-        let [p, q, r] = t.parameters.map(|[u, v]| {
-            let normal = surface.jet(u, v, 1).normal();
+        let [p, q, r] = [0, 1, 2].map(|k| {
+            let (v, own) = (t.vertices[k] as usize, (t.patch, t.parameters[k]));
+            let normal = if uses[v] == Some(own) { normals[v] } else { at(own.0, own.1) };
             // At poles rounding decides.
             normal.filter(|n| n.dot(&flat) > 0.5).unwrap_or(flat) * sign
         });

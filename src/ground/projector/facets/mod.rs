@@ -9,6 +9,7 @@ use crate::{Point, Vector};
 use csg::{CurveId, PatchId};
 use edges::Edges;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Patches as facets and curves as polylines, with projection to them.
 ///
@@ -20,7 +21,7 @@ use rayon::prelude::*;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FacetProjector {
     source: Source,
-    patches: Vec<PatchFacets>,
+    patches: Vec<Arc<PatchFacets>>,
     curves: Vec<Polyline>,
     tolerance: f64,
 }
@@ -43,8 +44,8 @@ pub(crate) struct Source {
 }
 
 /// The facets of one patch.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct PatchFacets {
+#[derive(Debug, PartialEq)]
+pub(crate) struct PatchFacets {
     tree: Tree,
     facets: Vec<[Point; 3]>,
     /// Unit normals of the patch at the corners of its facets.
@@ -87,35 +88,45 @@ const COORDINATE_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 impl FacetProjector {
     pub(crate) fn new(source: Source) -> Self {
-        Self::with_normals(source, None)
+        let edges = Edges::new(&source.triangles);
+        let rounding = normals::rounding(&source.points);
+        let (all, slivers) = normals::trusted(&source.points, &source.triangles, &edges, rounding);
+        let of_corners = |members: &[u32]| {
+            let triangles: Vec<[u32; 3]> = members.iter().map(|&t| source.triangles[t as usize]).collect();
+            let of: Vec<Vector> = members.iter().map(|&t| all[t as usize]).collect();
+            let sliver: Vec<bool> = members.iter().map(|&t| slivers[t as usize]).collect();
+            normals::of_corners(&source.points, &triangles, &of, &sliver, &source.tips)
+        };
+        let tolerance = tolerance(&source.points);
+        let patches = patches(&source, &edges, tolerance, of_corners, |_| None);
+        Self::of(source, patches, tolerance)
     }
 
     /// A projector with unit normals at the corners of all triangles, instead of those of the
-    /// triangles.
-    pub(crate) fn with_normals(source: Source, given: Option<&[[Vector; 3]]>) -> Self {
-        let edges = Edges::new(&source.triangles);
-        let rounding = normals::rounding(&source.points);
-        let (normals, slivers) = normals::trusted(&source.points, &source.triangles, &edges, rounding);
-        let all = bounds(&source.points);
-        let largest = all.min.coords.amax().max(all.max.coords.amax());
-        let tolerance = f64::max(ON_SURFACE * all.diagonal(), COORDINATE_ROUNDING * largest);
-        let mut members: Vec<Vec<u32>> = vec![Vec::new(); source.patches as usize];
-        for (t, &patch) in source.patch_of.iter().enumerate() {
-            if patch != NO_PATCH {
-                members[patch as usize].push(t as u32);
-            }
-        }
-        let patch = |members: &Vec<u32>| {
-            let of = |all: &[Vector]| -> Vec<Vector> { members.iter().map(|&t| all[t as usize]).collect() };
-            let sliver: Vec<bool> = members.iter().map(|&t| slivers[t as usize]).collect();
-            let mut own =
-                PatchFacets::new(&source, &edges, members, &of(&normals), &sliver, ON_PLANE * tolerance);
-            if let Some(given) = given {
-                own.normals = members.iter().map(|&t| given[t as usize]).collect();
-            }
-            own
-        };
-        let patches = members.par_iter().map(patch).collect();
+    /// triangles, and their edges. Facets of patches that are `known` are not looked at.
+    pub(crate) fn with_normals(
+        source: Source,
+        normals: &[[Vector; 3]],
+        edges: &Edges,
+        known: impl Fn(usize) -> Option<Arc<PatchFacets>> + Sync,
+    ) -> Self {
+        let tolerance = tolerance(&source.points);
+        let of_corners = |members: &[u32]| members.iter().map(|&t| normals[t as usize]).collect();
+        let patches = patches(&source, edges, tolerance, of_corners, known);
+        Self::of(source, patches, tolerance)
+    }
+
+    /// The facets of each patch, for projectors that have the same patches.
+    pub(crate) fn facets_of(
+        source: &Source,
+        normals: &[[Vector; 3]],
+        edges: &Edges,
+    ) -> Vec<Arc<PatchFacets>> {
+        let of_corners = |members: &[u32]| members.iter().map(|&t| normals[t as usize]).collect();
+        patches(source, edges, tolerance(&source.points), of_corners, |_| None)
+    }
+
+    fn of(source: Source, patches: Vec<Arc<PatchFacets>>, tolerance: f64) -> Self {
         let polyline = |c: &Vec<u32>| {
             Polyline::new(c.iter().map(|&v| source.points[v as usize]).collect(), ON_PLANE * tolerance)
         };
@@ -291,13 +302,40 @@ impl Reader<'_> {
     }
 }
 
+/// The tolerance of projections to facets with these points.
+fn tolerance(points: &[Point]) -> f64 {
+    let all = bounds(points);
+    let largest = all.min.coords.amax().max(all.max.coords.amax());
+    f64::max(ON_SURFACE * all.diagonal(), COORDINATE_ROUNDING * largest)
+}
+
+/// The facets of each patch with the normals at their corners; those of some are `known`.
+fn patches(
+    source: &Source,
+    edges: &Edges,
+    tolerance: f64,
+    normals: impl Fn(&[u32]) -> Vec<[Vector; 3]> + Sync,
+    known: impl Fn(usize) -> Option<Arc<PatchFacets>> + Sync,
+) -> Vec<Arc<PatchFacets>> {
+    let mut members: Vec<Vec<u32>> = vec![Vec::new(); source.patches as usize];
+    for (t, &patch) in source.patch_of.iter().enumerate() {
+        if patch != NO_PATCH {
+            members[patch as usize].push(t as u32);
+        }
+    }
+    let made = |members: &Vec<u32>| {
+        Arc::new(PatchFacets::new(source, edges, members, normals(members), ON_PLANE * tolerance))
+    };
+    let patch = |(patch, members)| known(patch).unwrap_or_else(|| made(members));
+    members.par_iter().enumerate().map(patch).collect()
+}
+
 impl PatchFacets {
     fn new(
         source: &Source,
         edges: &Edges,
         members: &[u32],
-        normals: &[Vector],
-        sliver: &[bool],
+        normals: Vec<[Vector; 3]>,
         tolerance: f64,
     ) -> Self {
         let triangles: Vec<[u32; 3]> = members.iter().map(|&t| source.triangles[t as usize]).collect();
@@ -325,7 +363,6 @@ impl PatchFacets {
             }
         }
         let flat = plane_normal(&facets, tolerance);
-        let normals = normals::of_corners(&source.points, &triangles, normals, sliver, &source.tips);
         Self { tree: Tree::new(&boxes), facets, normals, rim, flat }
     }
 

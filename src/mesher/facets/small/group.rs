@@ -6,10 +6,12 @@ use super::layout::Layout;
 use super::report::{MergedEdge, MergedFace, MergedSmall, NamedFace};
 use crate::Point;
 use crate::ground::mesh::Touching;
+use crate::ground::progress::Work;
 use crate::ground::projector::BrepProjector;
 use crate::ground::size::SizeField;
 use crate::mesher::facets::FacetModel;
-use crate::mesher::facets::exact::{Shape, grouped};
+use crate::mesher::facets::exact::{Shape, exact, grouped};
+use brep::{Model, Tessellation};
 use rayon::prelude::*;
 
 /// Faces of a file as patches, and its edges as curves.
@@ -40,6 +42,8 @@ pub struct Small<'a> {
     pub touching: &'a Touching,
     /// The wanted size of elements of a model.
     pub size: &'a dyn Fn(&FacetModel) -> Box<dyn SizeField>,
+    /// Ends the search for what is small when it is cancelled.
+    pub work: &'a Work<'a>,
 }
 
 /// Share of the factor of tips that must be left after they were cut off: sizes are smaller then,
@@ -103,11 +107,32 @@ pub type Merged = (FacetModel, BrepProjector, Grouping);
 
 /// What was merged.
 pub(super) struct Outcome {
-    /// None if nothing is.
-    pub merged: Option<Merged>,
+    /// The facets with their groups; none if nothing is.
+    pub merged: Option<(FacetModel, Grouping)>,
     pub report: MergedSmall,
     /// The sizes of the model after it; none if nothing may be merged.
     pub size: Option<Box<dyn SizeField>>,
+    /// The model of which tips were cut off before it, if any were.
+    pub cut: Option<(Model, Tessellation, Shape)>,
+}
+
+impl Outcome {
+    /// What was merged of a model, if anything, with its exact faces.
+    pub fn finished(
+        self,
+        model: &Model,
+        tessellation: &Tessellation,
+        shape: &Shape,
+    ) -> (Option<Merged>, MergedSmall) {
+        let merged = self.merged.map(|(facets, grouping)| {
+            let exact = match &self.cut {
+                Some((model, tessellation, shape)) => exact(model, tessellation, shape, &grouping),
+                None => exact(model, tessellation, shape, &grouping),
+            };
+            (facets, exact, grouping)
+        });
+        (merged, self.report)
+    }
 }
 
 /// Merges the small faces and edges of a model, of which tips may have been cut off.
@@ -123,13 +148,14 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> Outcom
     }
     let mut factor = small.factor;
     loop {
-        if !allowed.faces.iter().chain(&allowed.edges).any(|allowed| *allowed) {
-            return Outcome { merged: None, report: MergedSmall::default(), size: None };
+        let is_over = small.work.is_cancelled();
+        if is_over || !allowed.faces.iter().chain(&allowed.edges).any(|allowed| *allowed) {
+            return Outcome { merged: None, report: MergedSmall::default(), size: None, cut: None };
         }
         let joins = joins(layout, &allowed.faces);
         let (grouping, chains) = grouping(layout, &joins, &allowed.edges);
         let mut report = report(layout, &joins, &chains, &allowed.edges);
-        let (mut facets, exact) = grouped(model, tessellation, shape, &grouping, &layout.blunt);
+        let mut facets = grouped(model, tessellation, shape, &grouping, &layout.blunt);
         facets.touching = small.touching.clone();
         let size = (small.size)(&facets);
         if !report.named.is_empty() {
@@ -138,7 +164,7 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> Outcom
             report.named.retain(|kept| small.factor * kept.width <= largest);
         }
         if report.faces.is_empty() && report.edges.is_empty() {
-            return Outcome { merged: None, report, size: Some(size) };
+            return Outcome { merged: None, report, size: Some(size), cut: None };
         }
         let is_small = |points: Vec<Point>, extent: f64, factor: f64| {
             points.into_iter().all(|p| factor * extent <= size.size_at(&p))
@@ -169,7 +195,7 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> Outcom
             }
         }
         if are_all_small {
-            return Outcome { merged: Some((facets, exact, grouping)), report, size: Some(size) };
+            return Outcome { merged: Some((facets, grouping)), report, size: Some(size), cut: None };
         }
         factor = small.still_factor;
     }

@@ -25,7 +25,7 @@ pub fn merge(model: &Model, tessellation: &Tessellation, small: &Small) -> (Opti
     let layout = Layout::new(model, tessellation, &shape);
     let narrow = Allowed::of(&layout, small.largest / small.factor).faces;
     let mut divisions = divisions(&layout, &narrow);
-    while !divisions.is_empty() {
+    while !divisions.is_empty() && !small.work.is_cancelled() {
         match merge_divided(model, tessellation, small, &divisions) {
             Ok(merged) => return merged,
             Err(failed) => divisions.retain(|division| !failed.contains(&division.face)),
@@ -91,23 +91,23 @@ fn with_tips(
     let is_merged = |face: usize| without_tips.report.faces.iter().any(|merged| merged.face == face + 1);
     candidates.retain(|candidate| !is_merged(candidate.face()));
     let ungrouped = shape.ungrouped(model);
-    let grouping = without_tips.merged.as_ref().map_or(&ungrouped, |merged| &merged.2);
+    let grouping = without_tips.merged.as_ref().map_or(&ungrouped, |merged| &merged.1);
     let mut ends = blunt(&layout, &candidates, small, |ends| {
-        (small.size)(&grouped(model, tessellation, shape, grouping, ends).0)
+        (small.size)(&grouped(model, tessellation, shape, grouping, ends))
     });
-    while !ends.is_empty() {
+    while !ends.is_empty() && !small.work.is_cancelled() {
         layout.blunt = ends.iter().map(|(_, end)| *end).collect();
         let (outcome, tips) =
             merge_tips(&layout, shape, small, candidates.clone(), merge_all(shape, &layout, small));
         let count = ends.len();
         ends.retain(|(candidate, _)| tips.iter().any(|tip| tip.candidate == *candidate));
         if ends.len() == count {
-            return (outcome.merged, outcome.report);
+            return outcome.finished(model, tessellation, shape);
         }
     }
     layout.blunt.clear();
     let (outcome, _) = merge_tips(&layout, shape, small, candidates, without_tips);
-    (outcome.merged, outcome.report)
+    outcome.finished(model, tessellation, shape)
 }
 
 /// Merges what is small and tips of faces at candidates, which are returned; `outcome` is the one
@@ -129,12 +129,12 @@ fn merge_tips(
         return (outcome, done);
     }
     let of_file =
-        || (small.size)(&grouped(model, tessellation, shape, &shape.ungrouped(model), &layout.blunt).0);
+        || (small.size)(&grouped(model, tessellation, shape, &shape.ungrouped(model), &layout.blunt));
     let mut size = outcome.size.take().unwrap_or_else(of_file);
     let mut merges = 0;
     for _ in 0..ROUNDS {
         let tips = narrow(layout, &candidates, &*size, small.tip_factors, &done);
-        if tips == done || merges == MERGES {
+        if tips == done || merges == MERGES || small.work.is_cancelled() {
             break;
         }
         let Some(cut) = cut_off(model, &tips) else { break };
@@ -180,7 +180,7 @@ fn merge_cut(uncut: &Layout, small: &Small, mut cut: Cut, tips: &[NarrowTip]) ->
     let shape = Shape::new(&cut.model, &tessellation);
     let mut layout = Layout::new(&cut.model, &tessellation, &shape);
     (layout.cuts, layout.along, layout.blunt) = (cuts, uncut.along.clone(), uncut.blunt.clone());
-    let Outcome { merged, report, size } = merge_all(&shape, &layout, small);
+    let Outcome { merged, report, size, .. } = merge_all(&shape, &layout, small);
     let is_merged = |k: usize| {
         report.faces.iter().any(|merged| merged.face == cut.patches[k] + 1)
             && report.edges.iter().any(|merged| merged.edge == cut.curves[k] + 1)
@@ -192,7 +192,8 @@ fn merge_cut(uncut: &Layout, small: &Small, mut cut: Cut, tips: &[NarrowTip]) ->
     if merged.as_ref().is_some_and(|(facets, ..)| has_crossings(facets)) {
         return Err(failed(&|_, _| true));
     }
-    Ok(Outcome { merged, report: of_file(report, model, &cut, tips), size })
+    let report = of_file(report, model, &cut, tips);
+    Ok(Outcome { merged, report, size, cut: Some((cut.model, tessellation, shape)) })
 }
 
 /// Whether an error is at a tip with this patch, cut along this curve; it is if it has no place.

@@ -1,5 +1,6 @@
 use super::{MergedSmall, Small, merge};
 use crate::ground::mesh::Touching;
+use crate::ground::progress::Work;
 use crate::ground::size::{SizeField, UniformSize};
 use crate::mesher::facets::FacetModel;
 use brep::{Model, Settings, Tessellation, Unit};
@@ -26,6 +27,7 @@ fn merged_with(mut model: Model, size: &dyn Fn(&FacetModel) -> f64) -> (Option<F
         tip_factors: [10.0, 4.0],
         touching: &Touching::default(),
         size: &size,
+        work: Work::unwatched(),
     };
     let (merged, report) = merge(&model, &tessellation, &small);
     (merged.map(|(facets, ..)| facets), report)
