@@ -5,7 +5,7 @@
 
 use crate::bspline::Basis;
 use crate::curve::Curve;
-use crate::project::{CurveFoot, SurfaceFoot, project_to_curve, project_to_surface};
+use crate::project::{CurveFoot, Domain, SurfaceFoot, project_to_curve, project_to_surface, project_within};
 use crate::surface::{Profile, Surface};
 use crate::{Point, Vector};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -112,6 +112,16 @@ pub fn nearest_on_surface(surface: &Surface, point: &Point) -> SurfaceFoot {
         *parameter -= period.map_or(0.0, |period| period * (*parameter / period).round());
     }
     foot
+}
+
+/// The parameters of the point in a domain of a surface that is nearest to a point.
+pub(crate) fn nearest_within(surface: &Surface, domain: Domain, point: &Point) -> [f64; 2] {
+    let distance = |p: &[f64; 2]| (surface.point(*p) - point).norm();
+    smallest(starts(surface, point), distance)
+        .into_iter()
+        .map(|start| project_within(surface, domain, point, start))
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .expect("a surface has samples")
 }
 
 /// Parameters from which the search for a nearest point starts.

@@ -13,7 +13,7 @@ pub(crate) use trace::Loop;
 
 use crate::bspline::{Basis, SplineCurve};
 use crate::model::{Fin, On};
-use crate::nearest::nearest_on_surface;
+use crate::nearest::{nearest_on_surface, nearest_within};
 use crate::project::{SurfaceFoot, project_to_surface, project_within};
 use crate::surface::Profile;
 use crate::{Curve, Point, Surface, Vector};
@@ -29,6 +29,8 @@ const AT_REST: f64 = 1e-7;
 const BEYOND: f64 = 1e-2;
 /// ... if the domain itself is this close, as a fraction of the diagonal.
 const BESIDE: f64 = 1e-4;
+/// Points whose distances differ by less than this (fraction of the diagonal) are equally near.
+const NEARLY: f64 = 1e-6;
 
 /// A surface on which edges are followed.
 pub(crate) struct Chart<'a> {
@@ -128,9 +130,22 @@ impl<'a> Chart<'a> {
         })
     }
 
-    /// The parameters of the nearest point of the whole surface.
+    /// The parameters of the nearest point of the whole surface, inside the domain of a spline if
+    /// one there is about as near: across a slit, an extrapolated surface meets its other side.
     fn anywhere(&self, point: &Point) -> Parameters {
-        nearest_on_surface(self.surface, point).parameters
+        let foot = nearest_on_surface(self.surface, point);
+        let domain = self.surface.domain();
+        let is_beyond = |i: usize| {
+            let at = foot.parameters[i];
+            domain[i].is_some_and(|[low, high]| at < low || at > high)
+        };
+        if !is_beyond(0) && !is_beyond(1) {
+            return foot.parameters;
+        }
+        let inside = nearest_within(self.surface, domain, point);
+        let off = |found: Point| (found - point).norm();
+        let is_near = off(self.surface.point(inside)) <= off(foot.point) + NEARLY * self.diagonal;
+        if is_near { inside } else { foot.parameters }
     }
 
     /// The parameters of the nearest point inside the domain of a spline, if a foot is far outside

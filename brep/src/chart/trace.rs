@@ -254,6 +254,7 @@ fn point(edge: &EdgeCurve, t: f64) -> Point {
 mod tests {
     use super::*;
     use crate::bspline::{Basis, SplineCurve};
+    use crate::project::project_to_surface;
     use crate::{Curve, Surface, Vector};
     use std::f64::consts::TAU;
 
@@ -263,10 +264,10 @@ mod tests {
         Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() })
     }
 
-    /// The wall above most of a circle: its extrapolation passes its start.
-    fn wall() -> (Curve<3>, Surface) {
+    /// The wall above a part of a circle: above most of it, its extrapolation passes its start.
+    fn wall(share: f64) -> (Curve<3>, Surface) {
         let pole = |k: usize| {
-            let (sine, cosine) = (0.9 * TAU * k as f64 / 9.0).sin_cos();
+            let (sine, cosine) = (share * TAU * k as f64 / 9.0).sin_cos();
             Vector::new(cosine, sine, 0.0)
         };
         let knots: Vec<f64> = (0..8).map(|k| f64::from(k) / 7.0).collect();
@@ -276,7 +277,7 @@ mod tests {
 
     #[test]
     fn fast_edges_at_the_end_of_an_open_surface_are_followed_inside_of_it() {
-        let (around, wall) = wall();
+        let (around, wall) = wall(0.9);
         // The edge runs along the wall, ever faster toward its ends.
         const STEPS: usize = 400;
         let shares: Vec<f64> = (0..=STEPS).map(|k| k as f64 / STEPS as f64).collect();
@@ -296,5 +297,15 @@ mod tests {
             assert!(gap < 1e-3, "{gap}");
             assert!(nodes.iter().all(|node| (-0.01..=1.01).contains(&node.1[0])), "{nodes:?}");
         }
+    }
+    #[test]
+    fn a_point_at_the_end_of_a_surface_is_not_found_across_a_slit() {
+        let (around, wall) = wall(0.9999);
+        let end = Point::from(around.point(1.0) + 0.5 * Vector::z());
+        let across = project_to_surface(&wall, &end, [-1e-4, 0.5]);
+        assert!(across.parameters[0] < 0.0 && (across.point - end).norm() < 1e-3, "{across:?}");
+        // Beside a large model that is nothing.
+        let [u, _] = Chart::new(&wall, 1e3).anywhere(&across.point);
+        assert!((0.99..=1.0).contains(&u), "{u}");
     }
 }

@@ -20,7 +20,7 @@ impl Shapes {
         self.find_closed(&mut solid_of);
         // Solids that touch have common edges too, so those that are closed do not take part.
         self.unite(&solid_of);
-        glue::glue_edges(self, self.size());
+        glue::glue_edges(self, self.size(), glue::OF_LOOSE_FACES);
         let open = self.find_closed(&mut solid_of);
         let mut first: Vec<usize> = solid_of.iter().flatten().copied().collect();
         first.sort_unstable();

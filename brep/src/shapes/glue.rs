@@ -13,18 +13,25 @@ use nalgebra::Vector2;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Corners of different solids at most this far apart are one (fraction of the diagonal) ...
-const SAME: f64 = 1e-7;
+pub(super) const SAME: f64 = 1e-7;
 /// ... or at most this many times the accuracy that the file states, ...
 const ROOM: f64 = 10.0;
-/// ... but not further apart than this (fraction of the shortest edge there).
+/// ... but not further apart than this (fraction of the shortest edge there), ...
 const SHORT: f64 = 0.05;
+/// ... and those of closed solids not further than this (fraction of the diagonal): some programs
+/// state an accuracy of 0.01 in all files.
+pub(super) const OF_SOLIDS: f64 = 1e-5;
+/// Corners of loose faces are as far apart as the file is accurate.
+pub(super) const OF_LOOSE_FACES: f64 = f64::INFINITY;
 /// Edges of one solid between the same corners are one if they are at most this far apart (fraction
 /// of the diagonal): the solid touches itself there.
 const SAME_IN_SOLID: f64 = 1e-9;
 
 /// Makes one of the corners and curves that solids share; faces use them afterwards.
-pub(super) fn glue_edges(shapes: &mut Shapes, diagonal: f64) {
-    let to = corners(shapes, diagonal);
+///
+/// They are `most` apart, as a fraction of the diagonal.
+pub(super) fn glue_edges(shapes: &mut Shapes, diagonal: f64, most: f64) {
+    let to = corners(shapes, diagonal, most);
     for curve in &mut shapes.curves {
         curve.ends = curve.ends.map(|end| to[end]);
     }
@@ -36,7 +43,7 @@ pub(super) fn glue_edges(shapes: &mut Shapes, diagonal: f64) {
         let curve = &shapes.curves[number];
         let [a, b] = curve.ends;
         let known = between.entry([a.min(b), a.max(b)]).or_default();
-        let tolerance = tolerance(shapes, shapes.body_of_curve[number], diagonal);
+        let tolerance = tolerance(shapes, shapes.body_of_curve[number], diagonal, most);
         let same = known.iter().find_map(|&other| {
             let is_own = shapes.body_of_curve[other] == shapes.body_of_curve[number];
             // Both sides of a narrow face of one solid are not one.
@@ -72,22 +79,23 @@ fn pairs(shapes: &Shapes) -> HashSet<[usize; 2]> {
     loops.filter_map(pair).collect()
 }
 
-/// Places of a body this far apart are one.
-pub(super) fn tolerance(shapes: &Shapes, body: usize, diagonal: f64) -> f64 {
-    f64::max(SAME * diagonal, ROOM * shapes.accuracy[body])
+/// Places of a body this far apart are one, but not further than `most` (fraction of the diagonal).
+pub(super) fn tolerance(shapes: &Shapes, body: usize, diagonal: f64, most: f64) -> f64 {
+    (ROOM * shapes.accuracy[body]).min(most * diagonal).max(SAME * diagonal)
 }
 
 /// For each corner the first one at its place of another solid, or itself.
-fn corners(shapes: &Shapes, diagonal: f64) -> Vec<usize> {
+fn corners(shapes: &Shapes, diagonal: f64, most: f64) -> Vec<usize> {
     let mut shortest = vec![f64::INFINITY; shapes.corners.len()];
     for curve in shapes.curves.iter().filter(|curve| curve.ends[0] != curve.ends[1]) {
         let [a, b] = curve.ends.map(|end| shapes.corners[end].point);
         curve.ends.iter().for_each(|&end| shortest[end] = shortest[end].min((b - a).norm()));
     }
     let reach = |corner: usize| {
-        tolerance(shapes, shapes.body_of_corner[corner], diagonal).min(SHORT * shortest[corner])
+        tolerance(shapes, shapes.body_of_corner[corner], diagonal, most).min(SHORT * shortest[corner])
     };
-    let size = (0..shapes.accuracy.len()).map(|body| tolerance(shapes, body, diagonal)).fold(0.0, f64::max);
+    let size =
+        (0..shapes.accuracy.len()).map(|body| tolerance(shapes, body, diagonal, most)).fold(0.0, f64::max);
     let cell = |p: &Point| p.coords.map(|x| (x / size).floor() as i64);
     let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
     let mut to: Vec<usize> = Vec::with_capacity(shapes.corners.len());

@@ -177,7 +177,7 @@ impl Shapes {
         if let Some((_, error)) = self.away.drain(..).find(|(off, _)| *off > AWAY * size) {
             return Err(error);
         }
-        glue::glue_edges(&mut self, size);
+        glue::glue_edges(&mut self, size, glue::OF_SOLIDS);
         split::divide_at_poles(&mut self, size);
         model.notes.extend(split::drop_spurs(&mut self));
         (model.corners, model.curves) = (self.corners, self.curves);

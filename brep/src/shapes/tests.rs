@@ -290,6 +290,16 @@ fn a_ball_in_a_socket_has_no_edges_of_its_own() {
 }
 
 #[test]
+fn solids_with_a_gap_below_the_accuracy_that_the_file_states_stay_apart() {
+    let mut solids = Solids::default();
+    solids.pin(Vector::zeros(), 1.0, [0.0, 1.0], 0.3);
+    solids.pin(Vector::zeros(), 1.0, [1.005, 2.005], 0.3);
+    solids.0.accuracy = vec![0.01; 2];
+    let model = assert_measures(solids, &[PI, PI], 0.0);
+    assert_eq!(model.corners.len(), 4);
+}
+
+#[test]
 fn solids_that_touch_in_a_line_stay_apart() {
     let mut solids = Solids::default();
     solids.block([0.0; 3], [1.0; 3]);

@@ -1,9 +1,10 @@
 //! Pairs of faces that may touch on a common surface.
 
 use super::super::{Face, Shapes};
-use super::{SAME, room};
+use super::room;
 use crate::nearest::nearest_on_surface;
 use crate::project::project_to_surface;
+use crate::shapes::glue::SAME;
 use crate::{Curve, EdgeCurve, Point, Surface};
 use rayon::prelude::*;
 

@@ -2,9 +2,10 @@
 
 use super::super::Shapes;
 use super::super::split::{divide, inner_parameter};
-use super::{SAME, room};
+use super::room;
 use crate::model::Corner;
 use crate::nearest::nearest_on_curve;
+use crate::shapes::glue::SAME;
 use crate::{EdgeCurve, Point};
 use std::collections::{BTreeMap, BTreeSet};
 

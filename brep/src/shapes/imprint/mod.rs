@@ -18,15 +18,10 @@ use cross::Pair;
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
 
-/// Faces this far apart touch (fraction of the diagonal) ...
-const SAME: f64 = 1e-7;
-/// ... or as far as the file is accurate, but not further than this.
-const FARTHEST: f64 = 1e-5;
-
-/// How far two faces that touch may be apart (length).
+/// How far two faces that touch may be apart (length): as far as corners that are one.
 pub(super) fn room(shapes: &Shapes, faces: [usize; 2], size: f64) -> f64 {
-    let accuracy = faces.map(|face| glue::tolerance(shapes, shapes.faces[face].body, size));
-    accuracy[0].max(accuracy[1]).clamp(SAME * size, FARTHEST * size)
+    let own = faces.map(|face| glue::tolerance(shapes, shapes.faces[face].body, size, glue::OF_SOLIDS));
+    own[0].max(own[1])
 }
 
 /// How often edges are divided at vertices, some of which are new for other edges.
@@ -47,7 +42,7 @@ pub(super) fn imprint(shapes: &mut Shapes, size: f64) -> bool {
 
 /// Divides faces that touch along each other's edges, and faces along the curves inside of them.
 pub(super) fn divide(shapes: &mut Shapes, mut contacts: Vec<[usize; 2]>, size: f64) {
-    glue::glue_edges(shapes, size);
+    glue::glue_edges(shapes, size, glue::OF_SOLIDS);
     retain_different(shapes, &mut contacts);
     let is_crossed = |face: &usize| !shapes.faces[*face].inner.is_empty();
     let crossed: Vec<usize> = (0..shapes.faces.len()).filter(is_crossed).collect();
@@ -69,9 +64,9 @@ fn divide_edges(shapes: &mut Shapes, pairs: &[Pair], size: f64) {
             break;
         }
     }
-    glue::glue_edges(shapes, size);
+    glue::glue_edges(shapes, size, glue::OF_SOLIDS);
     cross::divide_at_crossings(shapes, pairs, size);
-    glue::glue_edges(shapes, size);
+    glue::glue_edges(shapes, size, glue::OF_SOLIDS);
 }
 
 /// Of curves that are to divide two faces each, leaves the parts that are inside of both.

@@ -7,9 +7,9 @@
 //! region.
 
 use super::super::{Edges, Shapes};
-use super::FARTHEST;
 use super::contact::lies_on;
 use crate::chart::{Chart, Parameters};
+use crate::shapes::glue::OF_SOLIDS;
 use crate::{Point, Vector};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -80,7 +80,7 @@ fn strips(shapes: &Shapes, chart: &Chart, number: usize, added: &[usize], size: 
     let is_own = |curve: usize| own.iter().any(|edge| edge.0 == curve);
     let may_divide = |&curve: &usize| {
         let edge = &shapes.curves[curve];
-        !is_own(curve) && lies_on(&face.surface, edge, FARTHEST * size + edge.tolerance)
+        !is_own(curve) && lies_on(&face.surface, edge, OF_SOLIDS * size + edge.tolerance)
     };
     let added: Vec<usize> = added.iter().copied().filter(may_divide).collect();
     if added.is_empty() || own.len() > shapes.curves_of(number).len() {
