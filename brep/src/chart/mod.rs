@@ -29,7 +29,8 @@ const AT_REST: f64 = 1e-7;
 const BEYOND: f64 = 1e-2;
 /// ... if the domain itself is this close, as a fraction of the diagonal.
 const BESIDE: f64 = 1e-4;
-/// Points whose distances differ by less than this (fraction of the diagonal) are equally near.
+/// Points whose distances differ by less than this (fraction of the diagonal) are equally near, and
+/// parameters this close to the domain (fraction of it) are inside.
 const NEARLY: f64 = 1e-6;
 
 /// A surface on which edges are followed.
@@ -137,7 +138,7 @@ impl<'a> Chart<'a> {
         let domain = self.surface.domain();
         let is_beyond = |i: usize| {
             let at = foot.parameters[i];
-            domain[i].is_some_and(|[low, high]| at < low || at > high)
+            domain[i].is_some_and(|[low, high]| (at - high).max(low - at) > NEARLY * (high - low))
         };
         if !is_beyond(0) && !is_beyond(1) {
             return foot.parameters;

@@ -368,7 +368,7 @@ impl Face<'_> {
     /// Inner edges whose ends are those of other edges too: different in parameters, equal in
     /// space.
     fn tangled(&self, triangles: &[Placed]) -> HashSet<[usize; 2]> {
-        // By their vertices in space, the edges in parameters, and whether their triangle has an area.
+        // By their vertices in space, edges in parameters, and whether their triangle has an area.
         let mut uses: Vec<([u32; 2], [usize; 2], bool)> = Vec::new();
         for Placed { corners: triangle, .. } in triangles {
             let v = [0, 1, 2].map(|k| triangle[k].1.vertex);

@@ -3,6 +3,7 @@
 //! Triangles of bodies that touch may intersect, so that no triangulation of space has them all. As
 //! the tets of each body have exactly its triangles as faces, bodies with common triangles conform.
 
+use super::closed_surface::doubles;
 use super::surface_faults::{SurfaceFault, SurfaceFaults};
 use super::{ClosedSurface, Report, Settings, VolumeError, VolumeMesh, intersections, mesh as fill};
 use crate::Point;
@@ -55,6 +56,14 @@ impl ClosedSurface {
                 if !faults.contains(&fault) {
                     faults.push(fault);
                 }
+            }
+        }
+        for [first, again] in doubles(&self.triangles) {
+            // Those of one body are among its faults, and a common triangle is there once.
+            let [a, b] = [first, again].map(|t| self.regions[t as usize]);
+            if !have_common_body(a, b) {
+                let place = self.points[self.triangles[first as usize][0] as usize];
+                faults.push(SurfaceFault::Twice { triangles: [first, again], place });
             }
         }
         for (pair, place) in intersections(&self.points, &self.triangles) {
@@ -205,6 +214,21 @@ mod tests {
         let mut touching = Touching::default();
         touching.add([Some(BodyId(3)), None], [Some(BodyId(5)), None]);
         touching
+    }
+
+    #[test]
+    fn a_triangle_of_two_bodies_may_not_be_there_twice() {
+        let mut cubes = Cubes::default();
+        cubes.add(3, [0.0; 3]);
+        cubes.add(5, [1.0, 0.0, 0.0]);
+        // Both have the vertices of the common side, but each its own triangles.
+        for v in cubes.triangles.iter_mut().flatten().filter(|v| **v >= 8) {
+            *v = if *v % 2 == 0 { *v - 7 } else { (*v + 7) / 2 };
+        }
+        cubes.points = (0..8).chain([9, 11, 13, 15]).map(|v| cubes.points[v]).collect();
+        let SurfaceFaults(faults) = cubes.apart().unwrap_err();
+        assert_eq!(faults.len(), 2, "{faults:?}");
+        assert!(faults.iter().all(|fault| matches!(fault, SurfaceFault::Twice { .. })), "{faults:?}");
     }
 
     #[test]

@@ -223,7 +223,7 @@ impl LeftOut {
 }
 
 /// Pairs of triangles with the same corners: the first one with each of the others.
-fn doubles(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+pub(super) fn doubles(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
     let mut order: Vec<([u32; 3], u32)> = triangles.iter().map(|&t| ascending(t)).zip(0..).collect();
     order.sort_unstable();
     let mut pairs: Vec<[u32; 2]> = order
