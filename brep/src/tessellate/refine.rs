@@ -117,12 +117,10 @@ impl Face<'_> {
             // A point inside of a triangle or of an edge makes two more of them.
             count += 2 * (self.plane.num_vertices() - first);
             let new = self.around_vertices_from(first);
-            for (triangles, is_one) in
-                [(&mut active, (|_| true) as fn(&Placed) -> bool), (&mut at_curves, is_at_curve)]
-            {
-                triangles.retain(|triangle| self.is_left(triangle));
-                triangles.extend(new.iter().copied().filter(is_one));
-            }
+            active.retain(|triangle| self.is_left(triangle));
+            at_curves.retain(|triangle| self.is_left(triangle));
+            at_curves.extend(new.iter().filter(|triangle| is_at_curve(triangle)));
+            active.extend(new);
         }
         // Triangles beside coarse sides may be folded however small they are.
         Err(self.folded(ENDLESS))
