@@ -14,7 +14,7 @@ pub(crate) use trace::Loop;
 use crate::bspline::{Basis, SplineCurve};
 use crate::model::{Fin, On};
 use crate::nearest::{nearest_on_surface, nearest_within};
-use crate::project::{SurfaceFoot, project_to_surface, project_within};
+use crate::project::{Domain, SurfaceFoot, project_to_surface, project_within};
 use crate::surface::Profile;
 use crate::{Curve, Point, Surface, Vector};
 use nalgebra::Vector2;
@@ -136,11 +136,7 @@ impl<'a> Chart<'a> {
     fn anywhere(&self, point: &Point) -> Parameters {
         let foot = nearest_on_surface(self.surface, point);
         let domain = self.surface.domain();
-        let is_beyond = |i: usize| {
-            let at = foot.parameters[i];
-            domain[i].is_some_and(|[low, high]| (at - high).max(low - at) > NEARLY * (high - low))
-        };
-        if !is_beyond(0) && !is_beyond(1) {
+        if !is_beyond(domain, foot.parameters, NEARLY) {
             return foot.parameters;
         }
         let inside = nearest_within(self.surface, domain, point);
@@ -153,11 +149,7 @@ impl<'a> Chart<'a> {
     /// of it and no nearer: extrapolated surfaces turn back.
     fn within(&self, point: &Point, guess: Parameters, foot: &SurfaceFoot) -> Option<Parameters> {
         let domain = self.surface.domain();
-        let is_beyond = |i: usize| {
-            let at = foot.parameters[i];
-            domain[i].is_some_and(|[low, high]| (at - high).max(low - at) > BEYOND * (high - low))
-        };
-        if !is_beyond(0) && !is_beyond(1) {
+        if !is_beyond(domain, foot.parameters, BEYOND) {
             return None;
         }
         let found = project_within(self.surface, domain, point, guess);
@@ -194,6 +186,12 @@ impl<'a> Chart<'a> {
         }
         found
     }
+}
+
+/// Whether parameters are outside of a domain by more than a fraction of it.
+fn is_beyond(domain: Domain, at: Parameters, room: f64) -> bool {
+    let is_one = |([low, high], at): ([f64; 2], f64)| (at - high).max(low - at) > room * (high - low);
+    domain.into_iter().zip(at).any(|(range, at)| range.is_some_and(|range| is_one((range, at))))
 }
 
 #[cfg(test)]

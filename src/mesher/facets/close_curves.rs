@@ -3,11 +3,11 @@
 
 use super::{FacetCurve, FacetModel};
 use crate::Point;
-use crate::ground::kernel::nearest::in_segment;
 use crate::ground::kernel::tree::{Tree, bounds};
+use crate::ground::projector::FacetProjector;
 use crate::ground::size::{SizeSettings, Source, Sources, thinned};
 use crate::mesher::surface::closeness::lowered;
-use csg::PatchId;
+use csg::{CurveId, PatchId};
 use rayon::prelude::*;
 
 /// Largest edge length, in distances of two curves: a strip of such triangles, one across, has
@@ -39,7 +39,7 @@ pub(super) fn sample(model: &FacetModel, settings: &SizeSettings, maximum: f64, 
     if others.iter().all(Vec::is_empty) {
         return;
     }
-    let lines = Lines::new(model);
+    let curves = Curves::new(model);
     let alone = Sources::new(settings.grading, maximum, &thinned(sources.clone()));
     let across = ACROSS * settings.scale.min(1.0);
     let of_curve = |related: &mut Vec<bool>, c: usize| {
@@ -50,43 +50,33 @@ pub(super) fn sample(model: &FacetModel, settings: &SizeSettings, maximum: f64, 
         others[c].iter().for_each(|&d| related[d] = true);
         let sizes = |p: &Point, most: &dyn Fn(f64) -> f64| {
             let alone = alone.size_at(p);
-            let distance = lines.distance(p, related, most(alone) / across);
+            let distance = curves.distance(p, related, most(alone) / across);
             Sizes { alone, wanted: (across * distance).max(settings.minh) }
         };
-        for w in lines.all[c].points.windows(2) {
+        for w in model.projector.curve_points(CurveId::new(c)).windows(2) {
             cut(w[0], w[1], MOST_CUTS, &sizes, &mut added);
         }
         others[c].iter().for_each(|&d| related[d] = false);
         added
     };
-    let curves = (0..model.curves.len()).into_par_iter();
-    let added: Vec<Vec<Source>> = curves.map_init(|| vec![false; model.curves.len()], of_curve).collect();
+    let all = (0..model.curves.len()).into_par_iter();
+    let added: Vec<Vec<Source>> = all.map_init(|| vec![false; model.curves.len()], of_curve).collect();
     sources.extend(added.concat());
 }
 
-/// All curves as polylines.
-struct Lines {
-    all: Vec<Line>,
+/// The curves of a model.
+struct Curves<'a> {
+    projector: &'a FacetProjector,
     /// Of their boxes.
     tree: Tree,
 }
 
-struct Line {
-    points: Vec<Point>,
-    /// Of its segments.
-    tree: Tree,
-}
-
-impl Lines {
-    fn new(model: &FacetModel) -> Self {
-        let line = |curve: &FacetCurve| {
-            let points: Vec<Point> = curve.vertices.iter().map(|&v| model.points[v as usize]).collect();
-            let tree = Tree::new(&points.windows(2).map(bounds).collect::<Vec<_>>());
-            Line { points, tree }
-        };
-        let all: Vec<Line> = model.curves.iter().map(line).collect();
-        let tree = Tree::new(&all.iter().map(|line| bounds(&line.points)).collect::<Vec<_>>());
-        Self { all, tree }
+impl<'a> Curves<'a> {
+    fn new(model: &'a FacetModel) -> Self {
+        let projector = &model.projector;
+        let curves = (0..projector.curves()).map(CurveId::new);
+        let boxes: Vec<_> = curves.map(|curve| bounds(projector.curve_points(curve))).collect();
+        Self { projector, tree: Tree::new(&boxes) }
     }
 
     /// The distance from the nearest of some curves; infinite if that is more than `most`.
@@ -95,14 +85,13 @@ impl Lines {
     fn distance(&self, p: &Point, is_of_them: &[bool], most: f64) -> f64 {
         let mut least = most * most;
         let to = |curve: u32| {
-            if !is_of_them[curve as usize] {
-                return f64::INFINITY;
+            if is_of_them[curve as usize]
+                && let Some(squared) = self.projector.curve_within(CurveId(curve), p, least)
+            {
+                least = squared;
+                return squared;
             }
-            let Line { points, tree } = &self.all[curve as usize];
-            let to = |s: u32| in_segment(p, &points[s as usize], &points[s as usize + 1]).1;
-            let Some((_, squared)) = tree.nearest_within(p, least, to) else { return f64::INFINITY };
-            least = squared;
-            squared
+            f64::INFINITY
         };
         self.tree.nearest_within(p, most * most, to).map_or(f64::INFINITY, |(_, squared)| squared.sqrt())
     }

@@ -182,6 +182,18 @@ impl FacetProjector {
         (self.project_curve(curve, point) - point).norm()
     }
 
+    /// The squared distance of `point` from `curve`, if it is less than `limit`.
+    pub(crate) fn curve_within(&self, curve: CurveId, point: &Point, limit: f64) -> Option<f64> {
+        let Polyline { points, tree, .. } = &self.curves[curve.index()];
+        let to = |s: u32| in_segment(point, &points[s as usize], &points[s as usize + 1]).1;
+        tree.nearest_within(point, limit, to).map(|(_, squared)| squared)
+    }
+
+    /// The points of a curve.
+    pub(crate) fn curve_points(&self, curve: CurveId) -> &[Point] {
+        &self.curves[curve.index()].points
+    }
+
     /// Whether all facets of a patch are in one plane up to a quarter of the
     /// [`tolerance`](Self::tolerance), so that means of its points need no projection.
     pub fn is_flat_patch(&self, patch: PatchId) -> bool {
