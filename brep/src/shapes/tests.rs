@@ -109,6 +109,16 @@ impl Solids {
         self.level(high, true, vec![vec![(above, true)]]);
     }
 
+    /// An upright cylinder with a seam between its vertices.
+    pub fn pin_with_seam(&mut self, center: Vector, radius: f64, z: [f64; 2], at: f64) {
+        self.pin(center, radius, z, at);
+        let wall = self.0.faces.len() - 3;
+        let rings: Edges = self.0.faces[wall].loops.iter().flatten().copied().collect();
+        let [a, b] = [0, 1].map(|k| self.0.curves[rings[k].0].ends[0]);
+        let seam = self.line(a, b);
+        self.0.faces[wall].loops = vec![vec![rings[0], (seam, true), rings[1], (seam, false)]];
+    }
+
     /// A ball.
     pub fn ball(&mut self, center: Vector, radius: f64) {
         self.body();

@@ -176,11 +176,16 @@ impl Shapes {
 
     /// Adds the curves of a crossing to its faces.
     fn add_crossing(&mut self, crossing: Crossing, size: f64) {
-        let [a, b] = crossing.faces;
-        let [on_b, on_a] = crossing.on;
-        self.faces[b].inner.extend(on_b);
-        self.faces[a].inner.extend(on_a);
-        let body = self.faces[a].body;
+        for (k, on_other) in crossing.on.into_iter().enumerate() {
+            let [face, other] = [crossing.faces[k], crossing.faces[1 - k]];
+            // Seams are left out when the face is divided; the other face divides it there, too.
+            let once = self.curves_used_once(face);
+            let is_seam = |curve: &usize| once.binary_search(curve).is_err();
+            let seams: Vec<usize> = on_other.iter().copied().filter(is_seam).collect();
+            self.faces[face].inner.extend(seams);
+            self.faces[other].inner.extend(on_other);
+        }
+        let body = self.faces[crossing.faces[0]].body;
         let tolerance = fit::ACCURACY * size;
         for Fitted { curve, range, is_closed } in crossing.added {
             let mut end = |t: f64| {

@@ -81,6 +81,17 @@ fn of_three_solids_each_place_belongs_to_one() {
 }
 
 #[test]
+fn a_face_may_divide_another_one_along_its_seam() {
+    let mut solids = Solids::default();
+    solids.block([0.0; 3], [2.0; 3]);
+    solids.pin_with_seam(X, 0.5, [0.5, 1.5], 0.0);
+    let (_, volumes, area) = cut(solids, OverlapTo::First);
+    assert_near(&volumes, &[8.0, PI / 8.0]);
+    // The pin's section and half of its wall, floor and roof.
+    assert_near(&[area], &[1.0]);
+}
+
+#[test]
 fn a_plane_may_pass_through_the_poles_of_a_ball() {
     let mut solids = Solids::default();
     solids.block([0.0; 3], [2.0; 3]);
