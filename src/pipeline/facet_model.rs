@@ -19,7 +19,7 @@ use crate::ground::projector::{BrepProjector, Projector};
 use crate::ground::size::{Closeness, Evaluation, SizeField, SizeSettings, Source, WatchedSize};
 use crate::mesher::facets::{
     FacetBodies, FacetError, FacetModel, FacetPatch, FacetSize, FacetSmoothness, Facets, Marks, SharpPlaces,
-    keep,
+    keep, unfold,
 };
 use crate::mesher::improve::Smoothness;
 use crate::mesher::smoothness::BrepSmoothness;
@@ -217,14 +217,16 @@ impl FacetSolid {
     /// Moves the vertices of a surface mesh from the facets onto the exact faces and edges.
     pub(super) fn snap(&self, surface: &mut SurfaceMesh) -> Result<(), CoarseError> {
         let Some(exact) = &self.exact else { return Ok(()) };
+        let before = surface.points.clone();
         surface.points.par_iter_mut().zip(&surface.classes).try_for_each(|(point, class)| {
             *point = match *class {
                 Class::Curve(curve) => exact.project_curve(curve, point)?,
                 Class::Patch(patch) => exact.project_patch(patch, point)?,
                 Class::Corner(_) | Class::Body(_) => *point,
             };
-            Ok(())
-        })
+            Ok::<_, CoarseError>(())
+        })?;
+        Ok(unfold(surface, &before, exact)?)
     }
 
     /// Makes a coarse mesh with the given sizes, which are lowered where surfaces are too close to

@@ -42,6 +42,7 @@ mod small;
 mod smoothness;
 #[cfg(test)]
 mod tests;
+mod unfold;
 
 pub use crate::ground::projector::FacetProjector;
 pub use bodies::FacetBodies;
@@ -57,3 +58,4 @@ pub use sharp_places::{SharpPlace, SharpPlaces};
 pub use size::{FacetSize, largest_size};
 pub use small::{Grouping, MergedEdge, MergedFace, MergedSmall, MergedTip, NamedFace, Small, merge};
 pub use smoothness::FacetSmoothness;
+pub use unfold::unfold;
