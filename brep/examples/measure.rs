@@ -1,5 +1,5 @@
-//! Prints the volumes and areas of the tessellated parts of BREP and STEP files. After
-//! `--overlap-to-first` solids that overlap are cut.
+//! Prints the volumes and areas of the tessellated parts of BREP and STEP files, whose solids are
+//! imprinted on each other. After `--overlap-to-first` solids that overlap are cut.
 
 use brep::{Model, OverlapTo, Settings, Tessellation, Unit, tessellate};
 
@@ -17,8 +17,8 @@ fn main() {
         let made = read.and_then(|mut model| {
             if cuts {
                 model.cut_overlaps(OverlapTo::First)?;
-                model.imprint();
             }
+            model.imprint();
             let tessellation = Tessellation::of(&mut model, &Settings::default())?;
             Ok((model, tessellation))
         });

@@ -129,6 +129,14 @@ pub enum Surface {
 }
 
 impl Surface {
+    /// A box around the whole surface, if it is a spline: that of its poles.
+    pub(crate) fn hull(&self) -> Option<[Point; 2]> {
+        let Self::Spline(spline) = self else { return None };
+        let mut poles = spline.poles.iter().map(|pole| Point::from(pole.xyz() / pole.w));
+        let first = poles.next()?;
+        Some(poles.fold([first; 2], |[low, high], pole| [low.inf(&pole), high.sup(&pole)]))
+    }
+
     /// The value and the derivatives up to a total `order` of at most 3. Third derivatives of
     /// offsets are zero.
     pub fn jet(&self, u: f64, v: f64, order: usize) -> Jet {

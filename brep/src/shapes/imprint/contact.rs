@@ -67,10 +67,19 @@ fn probe(shapes: &Shapes, number: usize, size: f64) -> Option<Probe> {
     for point in all.chain(whole) {
         (low, high) = (low.inf(&point), high.sup(&point));
     }
-    // Between its edges a curved face may leave their box.
-    let room = SAME * size + if face.surface.is_plane() { 0.02 } else { 0.5 } * (high - low).norm();
     points.extend(edges.iter().flat_map(|edge| beside(&face.surface, edge)));
-    Some(Probe { low: low.map(|x| x - room), high: high.map(|x| x + room), points })
+    let room = |share: f64, [low, high]: [Point; 2]| {
+        let room = SAME * size + share * (high - low).norm();
+        [low.map(|x| x - room), high.map(|x| x + room)]
+    };
+    // Between its edges a curved face may leave their box, but not that of its poles.
+    let flat = 0.02;
+    [low, high] = room(if face.surface.is_plane() { flat } else { 0.5 }, [low, high]);
+    if let Some(hull) = face.surface.hull() {
+        let [lowest, highest] = room(flat, hull);
+        (low, high) = (low.sup(&lowest), high.inf(&highest));
+    }
+    Some(Probe { low, high, points })
 }
 
 fn at(edge: &EdgeCurve, share: f64) -> Point {
