@@ -60,6 +60,12 @@ pub(super) fn inner_parameter(edge: &EdgeCurve, point: &Point, tolerance: f64, a
 /// Divides a curve at a corner; all loops follow both halves afterwards. The first half keeps the
 /// index of the curve.
 pub(super) fn divide(shapes: &mut Shapes, curve: usize, at: f64, corner: usize) {
+    let faces: Vec<usize> = (0..shapes.faces.len()).collect();
+    divide_in(shapes, &faces, curve, at, corner);
+}
+
+/// Divides a curve that only these faces may have at a corner.
+pub(super) fn divide_in(shapes: &mut Shapes, faces: &[usize], curve: usize, at: f64, corner: usize) {
     let second = shapes.curves.len();
     let edge = &mut shapes.curves[curve];
     let [low, high] = edge.range;
@@ -67,17 +73,17 @@ pub(super) fn divide(shapes: &mut Shapes, curve: usize, at: f64, corner: usize) 
     (edge.range, edge.ends) = ([low, at], [edge.ends[0], corner]);
     shapes.curves.push(half);
     shapes.body_of_curve.push(shapes.body_of_curve[curve]);
-    for edges in shapes.faces.iter_mut().flat_map(|face| &mut face.loops) {
-        let halves = |&(other, is_forward): &(usize, bool)| match (other == curve, is_forward) {
-            (false, _) => vec![(other, is_forward)],
-            (true, true) => vec![(curve, true), (second, true)],
-            (true, false) => vec![(second, false), (curve, false)],
-        };
-        *edges = edges.iter().flat_map(halves).collect();
-    }
-    for inner in shapes.faces.iter_mut().map(|face| &mut face.inner) {
-        if inner.contains(&curve) {
-            inner.push(second);
+    for &face in faces {
+        let face = &mut shapes.faces[face];
+        for edges in &mut face.loops {
+            // From the end: the places before stay.
+            for k in (0..edges.len()).rev().filter(|&k| edges[k].0 == curve).collect::<Vec<_>>() {
+                let is_forward = edges[k].1;
+                edges.insert(k + usize::from(is_forward), (second, is_forward));
+            }
+        }
+        if face.inner.contains(&curve) {
+            face.inner.push(second);
         }
     }
 }

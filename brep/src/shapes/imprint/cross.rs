@@ -1,13 +1,13 @@
 //! Edges divided where edges of another face on the same surface meet them.
 
 use super::super::Shapes;
-use super::super::split::{divide, inner_parameter};
+use super::super::split::{divide_in, inner_parameter};
 use super::room;
 use crate::model::Corner;
 use crate::nearest::nearest_on_curve;
 use crate::shapes::glue::SAME;
 use crate::{EdgeCurve, Point};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Where curves are to be divided: parameters and corners.
 type Divisions = BTreeMap<usize, Vec<(f64, usize)>>;
@@ -81,12 +81,13 @@ pub(super) fn divide_at_crossings(shapes: &mut Shapes, pairs: &[Pair], size: f64
     for &pair in pairs {
         let own = room(shapes, pair.faces(), size);
         let [of_a, of_b] = pair.sides(shapes);
+        let row = Row::new(shapes, &mut boxes, &of_b);
         for &p in &of_a {
-            for &q in of_b.iter().filter(|&&q| q != p) {
+            let reach = 2.0 * (own + shapes.curves[p].tolerance + row.tolerance);
+            let beside = row.beside(&boxes.of(shapes, p, reach));
+            for q in beside.into_iter().map(|k| of_b[k]).filter(|&q| q != p) {
                 let room = own + shapes.curves[p].tolerance + shapes.curves[q].tolerance;
-                let one = boxes.of(shapes, p, room);
-                let other = boxes.of(shapes, q, room);
-                if !overlap(&one, &other) {
+                if !overlap(&boxes.of(shapes, p, room), &boxes.of(shapes, q, room)) {
                     continue;
                 }
                 for (at, point) in crossings(&shapes.curves[p], &shapes.curves[q], room) {
@@ -113,7 +114,17 @@ pub(super) fn divide_at_crossings(shapes: &mut Shapes, pairs: &[Pair], size: f64
 
 /// Divides curves, each at one corner only where several are close.
 fn apply(shapes: &mut Shapes, divisions: Divisions, size: f64) {
+    let mut faces_of: HashMap<usize, Vec<usize>> = HashMap::new();
+    for face in 0..shapes.faces.len() {
+        let mut curves = shapes.curves_on(face);
+        curves.sort_unstable();
+        curves.dedup();
+        for curve in curves.into_iter().filter(|curve| divisions.contains_key(curve)) {
+            faces_of.entry(curve).or_default().push(face);
+        }
+    }
     for (curve, mut places) in divisions {
+        let faces = faces_of.remove(&curve).unwrap_or_default();
         places.sort_by(|a, b| a.0.total_cmp(&b.0));
         let room = AT_END * SAME * size;
         let is_apart = |a: usize, b: usize| (shapes.corners[a].point - shapes.corners[b].point).norm() > room;
@@ -123,7 +134,7 @@ fn apply(shapes: &mut Shapes, divisions: Divisions, size: f64) {
             let on = Point::from(shapes.curves[curve].curve.point(at));
             let own = &mut shapes.corners[corner];
             own.tolerance = own.tolerance.max((on - own.point).norm());
-            divide(shapes, curve, at, corner);
+            divide_in(shapes, &faces, curve, at, corner);
         }
     }
 }
@@ -136,6 +147,40 @@ impl Boxes {
     fn of(&mut self, shapes: &Shapes, curve: usize, room: f64) -> [Point; 2] {
         let own = self.0.entry(curve).or_insert_with(|| bounds(&polyline(&shapes.curves[curve]), 0.0));
         [own[0].map(|x| x - room), own[1].map(|x| x + room)]
+    }
+}
+
+/// Curves in the order of the lower ends of their boxes along the first axis.
+struct Row {
+    /// Lower and upper end, and the place among the curves.
+    ends: Vec<([f64; 2], usize)>,
+    /// The length of the longest box.
+    longest: f64,
+    /// The largest tolerance.
+    tolerance: f64,
+}
+
+impl Row {
+    fn new(shapes: &Shapes, boxes: &mut Boxes, curves: &[usize]) -> Self {
+        let mut ends: Vec<([f64; 2], usize)> = Vec::with_capacity(curves.len());
+        for (place, &curve) in curves.iter().enumerate() {
+            let [low, high] = boxes.of(shapes, curve, 0.0);
+            ends.push(([low.x, high.x], place));
+        }
+        ends.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
+        let longest = ends.iter().map(|([low, high], _)| high - low).fold(0.0, f64::max);
+        let tolerance = curves.iter().map(|&curve| shapes.curves[curve].tolerance).fold(0.0, f64::max);
+        Self { ends, longest, tolerance }
+    }
+
+    /// The places of the curves whose boxes overlap another one along the axis, ascending.
+    fn beside(&self, [low, high]: &[Point; 2]) -> Vec<usize> {
+        let first = self.ends.partition_point(|(ends, _)| ends[0] + self.longest < low.x);
+        let beside = self.ends[first..].iter().take_while(|(ends, _)| ends[0] <= high.x);
+        let mut places: Vec<usize> =
+            beside.filter(|(ends, _)| ends[1] >= low.x).map(|(_, place)| *place).collect();
+        places.sort_unstable();
+        places
     }
 }
 

@@ -17,11 +17,28 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 struct Strip {
     curve: usize,
     ends: [usize; 2],
-    /// Parameters along it.
+    /// Parameters along it, and the box around them.
     nodes: Vec<Parameters>,
+    bounds: [Parameters; 2],
     length: f64,
     /// Whether it bounds the face, with the face on the left of its direction.
     own: Option<bool>,
+}
+
+impl Strip {
+    fn new(curve: usize, ends: [usize; 2], nodes: Vec<Parameters>, length: f64, own: Option<bool>) -> Self {
+        let of = |i: usize, all: fn(f64, f64) -> f64| nodes.iter().map(|p| p[i]).reduce(all).unwrap_or(0.0);
+        let bounds = [[of(0, f64::min), of(1, f64::min)], [of(0, f64::max), of(1, f64::max)]];
+        Self { curve, ends, nodes, bounds, length, own }
+    }
+
+    /// Whether its box is on one side of a line.
+    fn is_beside(&self, start: Parameters, way: Parameters) -> bool {
+        let [low, high] = self.bounds;
+        let side = |p: Parameters| cross(way, minus(p, start)) > 0.0;
+        let corners = [low, [high[0], low[1]], high, [low[0], high[1]]].map(side);
+        corners.iter().all(|side| *side == corners[0])
+    }
 }
 
 /// A strip with a direction: twice its index, plus one against its curve.
@@ -91,7 +108,7 @@ fn strips(shapes: &Shapes, chart: &Chart, number: usize, added: &[usize], size: 
         let nodes = chart.along(edge)?;
         let length =
             nodes.windows(2).map(|w| (face.surface.point(w[1]) - face.surface.point(w[0])).norm()).sum();
-        Some(Strip { curve, ends: edge.ends, nodes, length, own })
+        Some(Strip::new(curve, edge.ends, nodes, length, own))
     };
     let strips: Option<Vec<Strip>> =
         own.iter().map(|&(curve, is_forward)| strip(curve, Some(is_forward))).collect();
@@ -112,7 +129,7 @@ pub(in super::super) fn is_clockwise(shapes: &Shapes, number: usize, size: f64) 
     let chart = Chart::new(&face.surface, size);
     let strip = |&(curve, is_forward): &(usize, bool)| {
         let nodes = chart.along(&shapes.curves[curve])?;
-        Some(Strip { curve, ends: [0; 2], nodes, length: 0.0, own: Some(is_forward) })
+        Some(Strip::new(curve, [0; 2], nodes, 0.0, Some(is_forward)))
     };
     let strips: Option<Vec<Strip>> = face.loops.iter().flatten().map(strip).collect();
     strips.is_some_and(|strips| area(&strips) < 0.0)
@@ -332,6 +349,9 @@ impl Sheet<'_> {
         hits.push(Hit { at: 1.0, before: half(to, cross(back, way) < 0.0), after: 0 });
         for (k, strip) in self.strips.iter().enumerate() {
             for by in self.rounds(strip, start, end) {
+                if strip.is_beside(minus(start, by), way) {
+                    continue;
+                }
                 for (segment, w) in strip.nodes.windows(2).enumerate() {
                     let [p, q] = [0, 1].map(|i| [w[i][0] + by[0], w[i][1] + by[1]]);
                     let [a, b] = [p, q].map(|p| cross(way, minus(p, start)));
@@ -360,8 +380,7 @@ impl Sheet<'_> {
     fn rounds(&self, strip: &Strip, start: Parameters, end: Parameters) -> Vec<Parameters> {
         let range = |i: usize| {
             let Some(period) = self.chart.period(i) else { return vec![0.0] };
-            let low = strip.nodes.iter().map(|p| p[i]).fold(f64::INFINITY, f64::min);
-            let high = strip.nodes.iter().map(|p| p[i]).fold(f64::NEG_INFINITY, f64::max);
+            let [low, high] = strip.bounds.map(|corner| corner[i]);
             let first = ((start[i].min(end[i]) - high) / period).ceil() as i64;
             let last = ((start[i].max(end[i]) - low) / period).floor() as i64;
             (first..=last).map(|k| period * k as f64).collect()
