@@ -15,7 +15,7 @@ use crate::{Point, Vector};
 use csg::{BodyId, CurveId, PatchId};
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
 
 /// Surfaces at most this far apart have a common point (fraction of the size of the model).
@@ -65,6 +65,9 @@ impl<'a> Contacts<'a> {
             return None;
         }
         let at = self.common_point(crossing.patches, crossing.at)?;
+        if self.part_at_common_curve(crossing.patches, &at) {
+            return Some(Contact::Touch);
+        }
         if self.is_on_common_curve(crossing.patches, &at) {
             return None;
         }
@@ -96,7 +99,8 @@ impl<'a> Contacts<'a> {
         pairs.any(|pair| {
             let found = self.common_point(pair, *at);
             found.is_some_and(|found| {
-                (found - at).norm() <= NEAR * self.size && self.are_tangent(pair, &found)
+                (found - at).norm() <= NEAR * self.size
+                    && (self.are_tangent(pair, &found) || self.part_at_common_curve(pair, &found))
             })
         })
     }
@@ -128,16 +132,30 @@ impl<'a> Contacts<'a> {
     }
 
     /// Whether a place is on an edge of both faces, from which points of the file may be off.
-    fn is_on_common_curve(&self, [a, b]: [PatchId; 2], at: &Point) -> bool {
-        let room = [a, b].map(|patch| self.model.patch(patch).inaccuracy);
+    fn is_on_common_curve(&self, patches: [PatchId; 2], at: &Point) -> bool {
+        let room = patches.map(|patch| self.model.patch(patch).inaccuracy);
         let room = room[0].max(room[1]).max(COMMON * self.size);
-        let common = self
-            .beside_curves()
-            .iter()
-            .enumerate()
-            .filter(|(_, beside)| beside.contains(&a) && beside.contains(&b));
-        let mut feet = common.filter_map(|(c, _)| self.exact.project_curve(CurveId::new(c), at).ok());
-        feet.any(|foot| (foot - at).norm() <= room)
+        self.feet_on_common_curves(patches, at).any(|foot| (foot - at).norm() <= room)
+    }
+
+    /// Whether a place is beside an edge of both faces at which these face each other and are
+    /// tangent: the gap between them begins there with no angle.
+    fn part_at_common_curve(&self, patches: [PatchId; 2], at: &Point) -> bool {
+        /// How far they are closer than `COMMON` (fraction of the size of the model).
+        const BESIDE: f64 = 1e-3;
+        self.feet_on_common_curves(patches, at).any(|foot| {
+            let [a, b] = patches.map(|patch| self.exact.normal(patch, &foot));
+            (foot - at).norm() <= BESIDE * self.size
+                && a.zip(b).is_some_and(|(a, b)| a.dot(&b) < 0.0)
+                && self.are_tangent(patches, &foot)
+        })
+    }
+
+    /// The nearest places to one on the edges that two faces have in common.
+    fn feet_on_common_curves(&self, [a, b]: [PatchId; 2], at: &Point) -> impl Iterator<Item = Point> {
+        let curves = self.beside_curves().iter().enumerate();
+        let common = curves.filter(move |(_, beside)| beside.contains(&a) && beside.contains(&b));
+        common.filter_map(|(c, _)| self.exact.project_curve(CurveId::new(c), at).ok())
     }
 
     /// A common point of two faces near a place, if they have one.
@@ -236,7 +254,7 @@ impl<'a> Contacts<'a> {
         free.filter_map(place).find_first(|place| self.is_inside(other, &there, place))
     }
 
-    /// Whether a place is inside of a body. Where it is closer to its facets than they are to the
+    /// Whether a place is inside of a body. Where it is closer to facets than these are to their
     /// face, the face decides.
     fn is_inside(&self, body: BodyId, facets: &Facets, place: &Point) -> bool {
         /// In distances of the facets from the face.
@@ -244,14 +262,22 @@ impl<'a> Contacts<'a> {
         if !facets.is_near(place) {
             return false;
         }
-        let (patch, near) = facets.nearest(place);
-        let foot = |from: &Point| self.exact.project_patch(patch, from).ok();
-        let (Some(off), Some(foot)) = (foot(&near).map(|foot| (foot - near).norm()), foot(place)) else {
-            return false;
-        };
-        if (near - place).norm() > ROOM * off + SHALLOW * self.size {
+        // The place may be on the other side of the facets of a face beside that of the nearest one.
+        let nearest = facets.nearest_patch(place);
+        let of_body = |patch: &PatchId| self.model.bodies_beside(*patch).contains(&Some(body));
+        let at_curves = self.beside_curves().iter().filter(|beside| beside.contains(&nearest)).flatten();
+        let patches: BTreeSet<PatchId> = at_curves.copied().filter(of_body).chain([nearest]).collect();
+        let foot = |patch: PatchId, from: &Point| self.exact.project_patch(patch, from).ok();
+        let close = patches.into_iter().filter_map(|patch| {
+            let near = self.model.projector.project_patch(patch, place);
+            let off = (foot(patch, &near)? - near).norm();
+            let is_close = (near - place).norm() <= ROOM * off + SHALLOW * self.size;
+            is_close.then_some((patch, foot(patch, place)?))
+        });
+        let away = |foot: &Point| (foot - place).norm();
+        let Some((patch, foot)) = close.min_by(|a, b| away(&a.1).total_cmp(&away(&b.1))) else {
             return facets.contain(place);
-        }
+        };
         let Some(normal) = self.exact.normal(patch, &foot) else { return false };
         let outward = if self.model.patch(patch).inside == Some(body) { normal } else { -normal };
         outward.dot(&(place - foot)) < -SHALLOW * self.size
@@ -284,15 +310,14 @@ impl Facets {
         (0..3).all(|axis| self.low[axis] <= point[axis] && point[axis] <= self.high[axis])
     }
 
-    /// The nearest point of them, and its patch.
-    fn nearest(&self, place: &Point) -> (PatchId, Point) {
-        let near = |k: u32| {
+    /// The patch of the nearest one.
+    fn nearest_patch(&self, place: &Point) -> PatchId {
+        let squared = |k: u32| {
             let corners = &self.corners[k as usize];
-            at(corners, in_triangle(place, corners))
+            (at(corners, in_triangle(place, corners)) - place).norm_squared()
         };
-        let nearest = self.tree.nearest(place, |k| (near(k) - place).norm_squared());
-        let (k, _) = nearest.expect("a body has facets");
-        (self.patches[k as usize], near(k))
+        let (nearest, _) = self.tree.nearest(place, squared).expect("a body has facets");
+        self.patches[nearest as usize]
     }
 
     /// Whether a point is inside of the body.

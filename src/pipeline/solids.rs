@@ -169,6 +169,17 @@ mod tests {
     }
 
     #[test]
+    fn the_gap_between_touching_faces_may_begin_with_no_angle() {
+        // A ring on a shaft, in part where that is rounded.
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/geometries/step/seated_ring.step");
+        let mut read = brep::Model::read_step(&std::fs::read(path).unwrap(), brep::Unit::OfFile).unwrap();
+        read.imprint();
+        let Tessellated { overlap, touching, .. } = tessellated(read).unwrap();
+        assert_eq!(overlap, None);
+        assert_eq!(touching.len(), 1);
+    }
+
+    #[test]
     fn solids_do_not_touch_where_their_faces_have_a_common_edge() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/geometries/step/touching.step");
         let mut read = brep::Model::read_step(&std::fs::read(path).unwrap(), brep::Unit::OfFile).unwrap();
