@@ -274,15 +274,17 @@ impl<'a> Contacts<'a> {
             let is_close = (near - place).norm() <= ROOM * off + SHALLOW * self.size;
             is_close.then_some((patch, foot(patch, place)?))
         });
-        let away = |foot: &Point| (foot - place).norm();
-        let Some((patch, foot)) = close.min_by(|a, b| away(&a.1).total_cmp(&away(&b.1))) else {
+        let close: Vec<(PatchId, Point)> = close.collect();
+        if close.is_empty() {
             return facets.contain(place);
-        };
+        }
+        let away = |(_, foot): &&(PatchId, Point)| (foot - place).norm();
+        let within = close.iter().filter(|(patch, foot)| self.exact.is_within(*patch, foot));
+        let nearest = within.min_by(|a, b| away(a).total_cmp(&away(b)));
+        let Some(&(patch, foot)) = nearest else { return false };
         let Some(normal) = self.exact.normal(patch, &foot) else { return false };
         let outward = if self.model.patch(patch).inside == Some(body) { normal } else { -normal };
-        outward.dot(&(place - foot)) < -SHALLOW * self.size
-            && self.exact.is_within(patch, &foot)
-            && self.edges_at(patch, &foot).is_empty()
+        outward.dot(&(place - foot)) < -SHALLOW * self.size && self.edges_at(patch, &foot).is_empty()
     }
 }
 
