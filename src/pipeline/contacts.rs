@@ -262,7 +262,7 @@ impl<'a> Contacts<'a> {
         if !facets.is_near(place) {
             return false;
         }
-        // The place may be on the other side of the facets of a face beside that of the nearest one.
+        // The place may be behind the facets of a face beside that of the nearest one.
         let nearest = facets.nearest_patch(place);
         let of_body = |patch: &PatchId| self.model.bodies_beside(*patch).contains(&Some(body));
         let at_curves = self.beside_curves().iter().filter(|beside| beside.contains(&nearest)).flatten();

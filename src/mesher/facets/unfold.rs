@@ -159,8 +159,8 @@ mod tests {
         let is_turned = x.cross(&y).dot(&exact.normal(patch, &center.into()).unwrap()) < 0.0;
         let y = if is_turned { -y } else { y };
 
-        // Around the vertex: the circle's at -30°, 0° and 30°, and others further out. On the facets
-        // the one at 0° was on the chord between its neighbours.
+        // Around the vertex: those of the circle at -30°, 0° and 30°, and others further out. That
+        // at 0° was on the chord between its neighbours.
         let polar = |r: f64, degrees: f64| {
             let angle = degrees.to_radians();
             Point::from(center + x * (r * angle.cos()) + y * (r * angle.sin()))
