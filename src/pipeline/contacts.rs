@@ -86,10 +86,15 @@ impl<'a> Contacts<'a> {
         self.touch_near(pairs, &at).then_some(Contact::Touch)
     }
 
+    /// The normals of two faces near a place; `None` at a pole.
+    fn normals(&self, patches: [PatchId; 2], at: &Point) -> Option<[Vector; 2]> {
+        let [a, b] = patches.map(|patch| self.exact.normal(patch, at));
+        Some([a?, b?])
+    }
+
     /// Whether two faces have a common normal at a place of both.
     fn are_tangent(&self, patches: [PatchId; 2], at: &Point) -> bool {
-        let [a, b] = patches.map(|patch| self.exact.normal(patch, at));
-        a.zip(b).is_some_and(|(a, b)| a.cross(&b).norm() <= TANGENT)
+        self.normals(patches, at).is_some_and(|[a, b]| a.cross(&b).norm() <= TANGENT)
     }
 
     /// Whether two faces of some pairs are tangent near a place.
@@ -143,11 +148,9 @@ impl<'a> Contacts<'a> {
     fn part_at_common_curve(&self, patches: [PatchId; 2], at: &Point) -> bool {
         /// How far they are closer than `COMMON` (fraction of the size of the model).
         const BESIDE: f64 = 1e-3;
+        let part = |[a, b]: [Vector; 2]| a.dot(&b) < 0.0 && a.cross(&b).norm() <= TANGENT;
         self.feet_on_common_curves(patches, at).any(|foot| {
-            let [a, b] = patches.map(|patch| self.exact.normal(patch, &foot));
-            (foot - at).norm() <= BESIDE * self.size
-                && a.zip(b).is_some_and(|(a, b)| a.dot(&b) < 0.0)
-                && self.are_tangent(patches, &foot)
+            (foot - at).norm() <= BESIDE * self.size && self.normals(patches, &foot).is_some_and(part)
         })
     }
 
@@ -197,8 +200,7 @@ impl<'a> Contacts<'a> {
         const ALIKE: f64 = 1e-3;
         let at = nalgebra::center(&feet[0], &feet[1]);
         let normals = |at: &Point| -> Option<[Vector; 2]> {
-            let [a, b] = patches.map(|patch| self.exact.normal(patch, at));
-            let (a, b) = (a?, b?);
+            let [a, b] = self.normals(patches, at)?;
             Some([a, if a.dot(&b) < 0.0 { -b } else { b }])
         };
         let [normal, other] = normals(&at)?;

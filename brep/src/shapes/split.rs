@@ -59,7 +59,7 @@ pub(super) fn inner_parameter(edge: &EdgeCurve, point: &Point, tolerance: f64, a
 
 /// Divides a curve at a corner; all loops follow both halves afterwards. The first half keeps the
 /// index of the curve.
-pub(super) fn divide(shapes: &mut Shapes, curve: usize, at: f64, corner: usize) {
+fn divide(shapes: &mut Shapes, curve: usize, at: f64, corner: usize) {
     let faces: Vec<usize> = (0..shapes.faces.len()).collect();
     divide_in(shapes, &faces, curve, at, corner);
 }

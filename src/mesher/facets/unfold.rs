@@ -10,6 +10,7 @@ use crate::ground::projector::BrepProjector;
 use crate::mesher::surface::SurfaceMesh;
 use crate::{Point, Vector};
 use csg::{PatchId, ProjectionFailed};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// A triangle whose normal turned by more than 60° has folded, or nearly so.
@@ -41,7 +42,7 @@ pub fn unfold(
         let ((m, was), (n, is)) = (flat(t, before), flat(t, &surface.points));
         is < NARROW && is < LOWER * was || m.dot(&n) < TURNED * m.norm() * n.norm()
     };
-    let turned: Vec<usize> = (0..surface.triangles.len()).filter(has_turned).collect();
+    let turned: Vec<usize> = (0..surface.triangles.len()).into_par_iter().filter(has_turned).collect();
     if turned.is_empty() {
         return Ok(());
     }

@@ -114,13 +114,17 @@ pub(super) fn divide_at_crossings(shapes: &mut Shapes, pairs: &[Pair], size: f64
 
 /// Divides curves, each at one corner only where several are close.
 fn apply(shapes: &mut Shapes, divisions: Divisions, size: f64) {
+    if divisions.is_empty() {
+        return;
+    }
     let mut faces_of: HashMap<usize, Vec<usize>> = HashMap::new();
     for face in 0..shapes.faces.len() {
-        let mut curves = shapes.curves_on(face);
-        curves.sort_unstable();
-        curves.dedup();
-        for curve in curves.into_iter().filter(|curve| divisions.contains_key(curve)) {
-            faces_of.entry(curve).or_default().push(face);
+        for curve in shapes.curves_on(face).into_iter().filter(|curve| divisions.contains_key(curve)) {
+            let faces = faces_of.entry(curve).or_default();
+            // A curve of the face may also be one that is to divide it.
+            if faces.last() != Some(&face) {
+                faces.push(face);
+            }
         }
     }
     for (curve, mut places) in divisions {
