@@ -11,6 +11,14 @@ const FEWEST: usize = 2;
 /// diagonal).
 const BENT: f64 = 1e-6;
 
+/// Where a curve goes back for at most this share of its length, and of the diagonal, that is a
+/// hook and no shape: edges of chamfers and offsets have them at bends sharper than they are wide.
+const HOOK: [f64; 2] = [5e-3, 1e-3];
+/// The cosine of the angle by which a curve turns at both ends of a hook, at most.
+const BACK: f64 = -0.2;
+/// Hooks are at least this far from other turns, in their own lengths: teeth are no hooks.
+const APART: f64 = 4.0;
+
 /// The middle of a side, straight in the parameters, is at most this far from its curve, in lengths
 /// of the side.
 const STRAY: f64 = 0.04;
@@ -81,7 +89,41 @@ pub(super) fn divide(
     }
     // Files bend the ends of curves to their vertices, which may make hooks.
     out.retain(|&t| is_closed || t == low || t == high || !(is_near(low, t) || is_near(t, high)));
-    Ok(out)
+    Ok(without_hooks(edge, out, diagonal))
+}
+
+/// The parameters without those on hooks of a curve, where it turns back and soon once more.
+///
+/// On both sides of a hook as much is left out as it is long: the curve crosses itself there.
+fn without_hooks(edge: &EdgeCurve, mut at: Vec<f64>, diagonal: f64) -> Vec<f64> {
+    let points: Vec<Vector> = at.iter().map(|&t| edge.curve.point(t)).collect();
+    let mut along = vec![0.0];
+    for w in points.windows(2) {
+        along.push(along[along.len() - 1] + (w[1] - w[0]).norm());
+    }
+    let length = along[along.len() - 1];
+    let turns_back = |w: &[Vector]| {
+        let [a, b] = [w[1] - w[0], w[2] - w[1]];
+        a.dot(&b) < BACK * a.norm() * b.norm()
+    };
+    let turns = (1..).zip(points.windows(3)).filter(|(_, w)| turns_back(w)).map(|(k, _)| along[k]);
+    let turns: Vec<f64> = turns.collect();
+    let hook = |k: usize| {
+        let [from, to] = [turns[k], turns[k + 1]];
+        let own = to - from;
+        let before = if k > 0 { turns[k - 1] } else { 0.0 };
+        let after = turns.get(k + 2).copied().unwrap_or(length);
+        let is_short = own <= (HOOK[0] * length).min(HOOK[1] * diagonal);
+        let is_apart = (from - before).min(after - to) >= APART * own;
+        (is_short && is_apart).then_some([from - own, to + own])
+    };
+    let hooks: Vec<[f64; 2]> = (1..turns.len()).filter_map(|k| hook(k - 1)).collect();
+    let mut along = along.into_iter();
+    at.retain(|_| {
+        let place = along.next().expect("one for each parameter");
+        hooks.iter().all(|[from, to]| place <= *from || *to <= place)
+    });
+    at
 }
 
 fn is_fine(
@@ -177,5 +219,24 @@ mod tests {
         assert!(inner.iter().any(|t| (t - 0.5).abs() < 1e-12), "{found:?}");
         let end = |t: f64| [0.0, 1.0].map(|e| (edge.curve.point(t) - edge.curve.point(e)).norm());
         assert!(inner.iter().all(|&t| end(t).iter().all(|off| *off > 2e-6)), "{found:?}");
+    }
+
+    #[test]
+    fn no_vertices_are_on_hooks_of_a_curve_but_on_teeth_and_wide_bends() {
+        let plane = Surface::Plane { origin: Vector::zeros(), axes: [Vector::x(), Vector::y()] };
+        let found = |points: &[[f64; 2]]| {
+            let edge = polyline(points);
+            let fin = Fin { on: crate::On::Curve(0), curve: None, range: edge.range, is_forward: true };
+            divide(&edge, &[(&plane, &fin)], (1e-9, 0.1), 2.0).unwrap()
+        };
+        let bent = |by: f64| [[0.0, 0.0], [1.0, 0.0], [1.0 - by, by], [2.0, by]];
+        // Its ends, and no other corner of the polyline.
+        let is_corner = |t: &&f64| [1.0 / 3.0, 2.0 / 3.0].iter().any(|corner| (*t - corner).abs() < 1e-12);
+        let corners = |by: f64| found(&bent(by)).iter().filter(is_corner).count();
+        assert_eq!([1e-3, 1e-2, 0.1].map(corners), [0, 2, 2]);
+
+        let tooth = |k: usize| [2e-3 * k as f64, if k.is_multiple_of(2) { 0.0 } else { 5e-3 }];
+        let teeth: Vec<[f64; 2]> = (0..=400).map(tooth).collect();
+        assert!(found(&teeth).len() > 400);
     }
 }
