@@ -8,6 +8,7 @@ mod overlap;
 mod split;
 #[cfg(test)]
 mod tests;
+mod twisted;
 
 pub(crate) use enclose::left_out;
 
@@ -177,6 +178,7 @@ impl Shapes {
         if let Some((_, error)) = self.away.drain(..).find(|(off, _)| *off > AWAY * size) {
             return Err(error);
         }
+        model.notes.extend(twisted::drop_twisted(&mut self, size));
         glue::glue_edges(&mut self, size, glue::OF_SOLIDS);
         split::divide_at_poles(&mut self, size);
         model.notes.extend(split::drop_spurs(&mut self));
