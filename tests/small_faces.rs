@@ -24,10 +24,11 @@ const PARTS: [(&str, f64, f64); 5] = [
 
 /// Parts with rounded edges, one with a low step whose front continues in a wall at its end, and
 /// one with a step around a corner. With their small faces they have up to two million tets.
-const MANY: [(&str, f64, f64); 4] = [
+const MANY: [(&str, f64, f64); 5] = [
     ("rounded_cube", 0.999_997_426, 5e-3),
     ("rounded_rims", 0.803_649_788, 0.01),
     ("low_step", 5.001, 1e-3),
+    ("spur", 4.002, 3e-3),
     ("cornered_step", 1.981_831_853, 5e-3),
 ];
 

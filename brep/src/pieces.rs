@@ -67,7 +67,8 @@ pub struct Cut {
 
 impl Model {
     /// Cuts pieces off their patches, along lines in the parameters. A piece may have others inside
-    /// that come before it. `None` if cuts cross each other, or pieces come in the wrong order.
+    /// that come before it. `None` if cuts cross each other, divide a curve at one place or at its
+    /// end, or pieces come in the wrong order.
     ///
     /// # Panics
     /// If there are no such loops and sides, or the sides at a cut are not curves.
@@ -76,14 +77,19 @@ impl Model {
         let mut divisions: Vec<Vec<(f64, usize)>> = vec![Vec::new(); self.curves.len()];
         let ends: Vec<[usize; 2]> =
             pieces.iter().map(|piece| self.ends_of_cut(piece, &mut model.corners, &mut divisions)).collect();
+        for (edge, at) in self.curves.iter().zip(&mut divisions) {
+            at.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let ends = edge.range.map(|t| (t, 0));
+            let places = [&ends[..1], at, &ends[1..]].concat();
+            if places.windows(2).any(|w| w[0].0 >= w[1].0) {
+                return None;
+            }
+        }
         let mut parts_of: Vec<Option<usize>> = (0..self.curves.len()).map(Some).collect();
         let parts: Vec<Vec<usize>> = divisions
-            .iter_mut()
+            .iter()
             .enumerate()
-            .map(|(curve, at)| {
-                at.sort_by(|a, b| a.0.total_cmp(&b.0));
-                divide(&mut model.curves, &mut parts_of, curve, at)
-            })
+            .map(|(curve, at)| divide(&mut model.curves, &mut parts_of, curve, at))
             .collect();
         let mut fins: Vec<Vec<Vec<Vec<Fin>>>> = self
             .patches

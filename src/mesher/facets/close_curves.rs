@@ -1,7 +1,7 @@
 //! Sizes between close curves of one patch: triangles between two curves are well-shaped only if
 //! they are not much longer than the gap is wide.
 
-use super::{FacetCurve, FacetModel};
+use super::{BluntEnd, FacetCurve, FacetModel};
 use crate::Point;
 use crate::ground::kernel::tree::{Tree, bounds};
 use crate::ground::projector::FacetProjector;
@@ -23,7 +23,7 @@ const MOST: f64 = 2000.0;
 const MOST_CUTS: u32 = 20;
 
 /// Adds sources along curves that are close, compared with the sizes, to another curve of the same
-/// patch without a common corner.
+/// patch without a common corner, outside of blunt ends.
 ///
 /// Far from all sources the size is `maximum`.
 pub(super) fn sample(model: &FacetModel, settings: &SizeSettings, maximum: f64, sources: &mut Vec<Source>) {
@@ -48,8 +48,13 @@ pub(super) fn sample(model: &FacetModel, settings: &SizeSettings, maximum: f64, 
             return added;
         }
         others[c].iter().for_each(|&d| related[d] = true);
+        let is_of_curve = |end: &&BluntEnd| patches[c].iter().any(|patch| patch.index() == end.patch);
+        let blunt: Vec<&BluntEnd> = model.blunt.iter().filter(is_of_curve).collect();
         let sizes = |p: &Point, most: &dyn Fn(f64) -> f64| {
             let alone = alone.size_at(p);
+            if blunt.iter().any(|end| end.reaches(p)) {
+                return Sizes { alone, wanted: f64::INFINITY };
+            }
             let distance = curves.distance(p, related, most(alone) / across);
             Sizes { alone, wanted: (across * distance).max(settings.minh) }
         };

@@ -131,7 +131,7 @@ pub struct FacetModel {
     pub projector: FacetProjector,
     /// The facets of faces that were merged into others, if there are any.
     pub merged: Option<Merged>,
-    /// Where the curvature of patches has no influence on sizes.
+    /// Where patches have no influence on sizes.
     pub blunt: Vec<BluntEnd>,
     /// Bodies whose facets may intersect.
     pub touching: Touching,
@@ -148,8 +148,8 @@ pub struct Merged {
     pub projector: FacetProjector,
 }
 
-/// The end of a patch around a corner where its curvature has no influence on sizes: its radius
-/// vanishes there with its width.
+/// The end of a patch around a corner where its curvature and the distance of its curves have no
+/// influence on sizes: its radius vanishes there with its width, or its sides are several curves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BluntEnd {
     /// The index of the patch; in models of which no patches were grouped, of the face.
@@ -163,8 +163,12 @@ pub struct BluntEnd {
 impl BluntEnd {
     /// Whether a facet of the patch is in this end.
     pub fn has(&self, [a, b, c]: &[Point; 3]) -> bool {
-        let middle = (a.coords + b.coords + c.coords) / 3.0;
-        (middle - self.corner.coords).norm() <= self.length
+        self.reaches(&Point::from((a.coords + b.coords + c.coords) / 3.0))
+    }
+
+    /// Whether it reaches as far as a point.
+    pub fn reaches(&self, point: &Point) -> bool {
+        (point - self.corner).norm() <= self.length
     }
 }
 

@@ -1,12 +1,15 @@
-//! Blunt ends of faces: where a fillet runs out to a point, its radius vanishes with its width.
+//! Blunt ends of faces, which have no influence on sizes.
 //!
-//! Sizes by curvature vanish there too, so that no tip of it is narrow beside them. So the end gets
-//! no size from its curvature where it is narrow beside the sizes that there are without it, as a
-//! small face does; then a tip of it can be cut off and merged.
+//! Where a fillet runs out to a point, its radius vanishes with its width. Sizes by curvature
+//! vanish there too, so that no tip of it is narrow beside them. The same is true of sizes by the
+//! distance of curves, where the sides of a tip go on over several edges: those beyond the first
+//! are close to each other without a common corner. So such an end has neither of these sizes where
+//! it is narrow beside those that there are without it, as a small face does; then a tip of it can
+//! be cut off and merged.
 
 use super::group::Small;
 use super::layout::Layout;
-use super::tips::{Candidate, last_narrow};
+use super::tips::{Candidate, Side, last_narrow};
 use crate::ground::size::{SizeField, UniformSize};
 use crate::mesher::facets::BluntEnd;
 
@@ -17,29 +20,48 @@ const SHARES: [f64; 2] = [0.5, 0.125];
 /// the radius is proportional to the distance from the tip.
 const GROWTH: f64 = 2.0;
 
-/// The ends of faces at candidates whose radius vanishes, where they are narrow beside the sizes
-/// that the model has `without` the influence of such ends; each with the index of its candidate.
+/// An end with several edges on a side reaches as far as it is narrow by a factor that is so much
+/// smaller: beyond it, sizes by the distance of its sides begin at once.
+const FURTHER: f64 = 4.0;
+
+/// It is at least so many times as long as with sizes by the distance of its sides. Where they are
+/// not that small, elements as small as the end is narrow have better angles than a tip cut off.
+const LONGER: f64 = 10.0;
+
+/// The ends of faces at candidates whose radius vanishes or whose sides are several edges, where
+/// they are narrow beside the sizes that the model has `without` the influence of such ends; each
+/// with the index of its candidate. `size` has those with it.
 pub(super) fn blunt(
     layout: &Layout,
     candidates: &[Candidate],
     small: &Small,
+    size: &dyn SizeField,
     without: impl FnOnce(&[BluntEnd]) -> Box<dyn SizeField>,
 ) -> Vec<(usize, BluntEnd)> {
     let largest = UniformSize(small.largest);
-    let vanishing = |candidate: &Candidate| {
-        if layout.model.patches[candidate.face()].surface.is_plane() {
-            return None;
+    // With whether the radius vanishes.
+    let mut all: Vec<(usize, BluntEnd, bool)> = Vec::new();
+    for (k, candidate) in candidates.iter().enumerate() {
+        let Some(end) = end(layout, candidate, &largest, small.factor) else { continue };
+        let vanishes = radius_vanishes(layout, candidate, end.length);
+        if vanishes || has_bends(layout, candidate, end.length) {
+            all.push((k, end, vanishes));
         }
-        let end = end(layout, candidate, &largest, small.factor)?;
-        radius_vanishes(layout, candidate, end.length).then_some(end)
-    };
-    let all: Vec<(usize, BluntEnd)> =
-        candidates.iter().enumerate().filter_map(|(k, candidate)| Some((k, vanishing(candidate)?))).collect();
-    if all.is_empty() {
-        return all;
     }
-    let size = without(&all.iter().map(|(_, end)| *end).collect::<Vec<_>>());
-    let narrow = |(k, _): (usize, BluntEnd)| Some((k, end(layout, &candidates[k], &*size, small.factor)?));
+    if all.is_empty() {
+        return Vec::new();
+    }
+    let larger = without(&all.iter().map(|(_, end, _)| *end).collect::<Vec<_>>());
+    let narrow = |(k, _, vanishes): (usize, BluntEnd, bool)| {
+        let factor = if vanishes { small.factor } else { small.factor / FURTHER };
+        let candidate = &candidates[k];
+        let at = end(layout, candidate, &*larger, factor)?;
+        let is_longer = || {
+            let length = end(layout, candidate, size, factor).map_or(0.0, |end| end.length);
+            at.length >= LONGER * length && has_bends(layout, candidate, at.length)
+        };
+        (vanishes || is_longer()).then_some((k, at))
+    };
     all.into_iter().filter_map(narrow).collect()
 }
 
@@ -55,6 +77,9 @@ fn end(layout: &Layout, candidate: &Candidate, size: &dyn SizeField, factor: f64
 /// Whether the radius of a face becomes smaller and smaller towards a tip.
 fn radius_vanishes(layout: &Layout, candidate: &Candidate, length: f64) -> bool {
     let patch = &layout.model.patches[candidate.face()];
+    if patch.surface.is_plane() {
+        return false;
+    }
     let [side, _] = candidate.sides(layout);
     let curvature = |share: f64| {
         let (fin, at) = side.at_distance(share * length)?;
@@ -63,4 +88,10 @@ fn radius_vanishes(layout: &Layout, candidate: &Candidate, length: f64) -> bool 
     };
     let [Some(far), Some(near)] = SHARES.map(curvature) else { return false };
     near >= GROWTH * far
+}
+
+/// Whether a side of a face goes on over several edges within so much of a tip.
+fn has_bends(layout: &Layout, candidate: &Candidate, length: f64) -> bool {
+    let edge = |side: &Side, distance: f64| side.at_distance(distance).map(|(edge, _)| edge);
+    candidate.sides(layout).iter().any(|side| edge(side, length) != edge(side, 0.0))
 }

@@ -3,12 +3,14 @@
 use super::blunt::blunt;
 use super::group::{Allowed, Merged, Outcome, Small, merge_all};
 use super::layout::{Layout, TipCut};
-use super::report::{MergedEdge, MergedSmall, MergedTip};
-use super::strips::{Division, divisions};
+use super::report::{MergedEdge, MergedFace, MergedSmall, MergedTip};
+use super::spurs::spurs;
+use super::strips::{Division, Rest, divisions};
 use super::tips::{Candidate, NarrowTip, candidates, narrow};
-use crate::mesher::facets::FacetModel;
 use crate::mesher::facets::exact::{Shape, grouped};
+use crate::mesher::facets::{BluntEnd, FacetModel};
 use brep::{BrepError, Cut, Model, On, Piece, Tessellation};
+use std::collections::HashMap;
 
 /// The most times that tips are cut off.
 const ROUNDS: usize = 12;
@@ -23,8 +25,9 @@ const MERGES: usize = 3;
 pub fn merge(model: &Model, tessellation: &Tessellation, small: &Small) -> (Option<Merged>, MergedSmall) {
     let shape = Shape::new(model, tessellation);
     let layout = Layout::new(model, tessellation, &shape);
-    let narrow = Allowed::of(&layout, small.largest / small.factor).faces;
-    let mut divisions = divisions(&layout, &narrow);
+    let allowed = Allowed::of(&layout, small.largest / small.factor);
+    let mut divisions = divisions(&layout, &allowed.faces);
+    divisions.extend(spurs(&layout, &allowed, &divisions));
     while !divisions.is_empty() && !small.work.is_cancelled() {
         match merge_divided(model, tessellation, small, &divisions) {
             Ok(merged) => return merged,
@@ -59,14 +62,19 @@ fn merge_divided(
     let shape = Shape::new(&cut.model, &tessellation);
     let mut layout = Layout::new(&cut.model, &tessellation, &shape);
     for (part, of) in cut.patch_parts_of.iter().enumerate() {
-        if let Some(division) = divisions.iter().find(|division| division.face == *of) {
+        let of_face = |division: &&Division| division.face == *of && !division.along.is_empty();
+        if let Some(division) = divisions.iter().find(of_face) {
             layout.along.insert(part, division.along.clone());
         }
     }
+    // The first part of a face has its number, and is what is left of it.
+    let is_kept = |face: usize| divisions.iter().any(|d| d.face == face && d.rest == Rest::Kept);
     let unmerged = |report: &MergedSmall| {
         let is_merged = |part: usize| report.faces.iter().any(|merged| merged.face == part + 1);
         let unmerged = divided(&|face| {
-            cut.patch_parts_of.iter().enumerate().any(|(part, of)| *of == face && !is_merged(part))
+            let must = |part: usize| part != face || !is_kept(face);
+            let mut parts = cut.patch_parts_of.iter().enumerate();
+            parts.any(|(part, of)| *of == face && must(part) && !is_merged(part))
         });
         if unmerged.is_empty() { Ok(()) } else { Err(unmerged) }
     };
@@ -74,7 +82,7 @@ fn merge_divided(
     unmerged(&without_tips.report)?;
     let (merged, report) = with_tips(layout, &shape, small, without_tips);
     unmerged(&report)?;
-    Ok((merged, divided_of_file(report, &cut)))
+    Ok((merged, divided_of_file(report, model, &cut, divisions)))
 }
 
 /// Merges what is small and tips of faces; `without_tips` is the result without them.
@@ -84,17 +92,21 @@ fn with_tips(
     mut layout: Layout,
     shape: &Shape,
     small: &Small,
-    without_tips: Outcome,
+    mut without_tips: Outcome,
 ) -> (Option<Merged>, MergedSmall) {
     let Layout { model, tessellation, .. } = layout;
     let mut candidates = candidates(&layout);
     let is_merged = |face: usize| without_tips.report.faces.iter().any(|merged| merged.face == face + 1);
     candidates.retain(|candidate| !is_merged(candidate.face()));
+    if candidates.is_empty() {
+        return without_tips.finished(model, tessellation, shape);
+    }
     let ungrouped = shape.ungrouped(model);
     let grouping = without_tips.merged.as_ref().map_or(&ungrouped, |merged| &merged.1);
-    let mut ends = blunt(&layout, &candidates, small, |ends| {
-        (small.size)(&grouped(model, tessellation, shape, grouping, ends))
-    });
+    let size = |ends: &[BluntEnd]| (small.size)(&grouped(model, tessellation, shape, grouping, ends));
+    let size_with = without_tips.size.take().unwrap_or_else(|| size(&[]));
+    let mut ends = blunt(&layout, &candidates, small, &*size_with, size);
+    without_tips.size = Some(size_with);
     while !ends.is_empty() && !small.work.is_cancelled() {
         layout.blunt = ends.iter().map(|(_, end)| *end).collect();
         let (outcome, tips) =
@@ -232,12 +244,34 @@ fn of_file(report: MergedSmall, model: &Model, cut: &Cut, tips: &[NarrowTip]) ->
     MergedSmall { faces, tips, edges: edges_of_file(report.edges, cut), named: report.named }
 }
 
-/// The report in the numbers of the file: pieces of a divided face have its number.
-fn divided_of_file(mut report: MergedSmall, cut: &Cut) -> MergedSmall {
-    let of_file = |face: &mut usize| *face = cut.patch_parts_of[*face - 1] + 1;
-    report.faces.iter_mut().for_each(|merged| of_file(&mut merged.face));
-    report.tips.iter_mut().for_each(|merged| of_file(&mut merged.face));
-    MergedSmall { edges: edges_of_file(report.edges, cut), ..report }
+/// The report in the numbers of the file: pieces of a divided face have its number, and spurs are
+/// tips.
+fn divided_of_file(report: MergedSmall, model: &Model, cut: &Cut, divisions: &[Division]) -> MergedSmall {
+    let of_file = |face: usize| cut.patch_parts_of[face - 1] + 1;
+    let pieces =
+        divisions.iter().flat_map(|division| division.pieces.iter().map(move |piece| (division, piece)));
+    let spurs: HashMap<usize, &Piece> = pieces
+        .zip(&cut.patches)
+        .filter(|((division, _), _)| division.rest == Rest::Kept)
+        .map(|((_, piece), patch)| (patch + 1, piece))
+        .collect();
+    let mut out = MergedSmall { edges: edges_of_file(report.edges, cut), ..report };
+    out.tips.iter_mut().for_each(|tip| (tip.face, tip.into) = (of_file(tip.face), of_file(tip.into)));
+    for merged in std::mem::take(&mut out.faces) {
+        let (face, into, width) = (of_file(merged.face), of_file(merged.into), merged.width);
+        match spurs.get(&merged.face) {
+            None => out.faces.push(MergedFace { face, into, ..merged }),
+            Some(spur) => out.tips.push(MergedTip { face, into, point: end_of(spur, model), width }),
+        }
+    }
+    out
+}
+
+/// The corner at the end of a spur.
+fn end_of(spur: &Piece, model: &Model) -> [f64; 3] {
+    let [arriving, _] = spur.sides(model);
+    let On::Curve(edge) = arriving.on else { panic!("the sides of a spur are edges") };
+    model.corners[model.curves[edge].ends[usize::from(arriving.is_forward)]].point.into()
 }
 
 /// Merged edges in the numbers of the file, which has no cuts: parts of an edge have its number.

@@ -14,7 +14,8 @@
 //!   thin sheet would.
 //!
 //! Before that, a narrow face along several others is divided where these change (`strips`), and a
-//! narrow **tip** of a face is cut off as a face of its own (`tips`). Ends of fillets that run out
+//! narrow part of a face is cut off as a face of its own: a **spur** that ends in a short edge
+//! (`spurs`), and a **tip** (`tips`). Ends of fillets that run out
 //! to a point are **blunt** for that: they have no sizes by curvature (`blunt`).
 //!
 //! Curves inside a composite patch are dropped. Then corners with two curves left are dropped if
@@ -30,6 +31,7 @@ mod group;
 mod layout;
 mod merge;
 mod report;
+mod spurs;
 mod strips;
 #[cfg(test)]
 mod tests;

@@ -57,8 +57,19 @@ pub(super) struct Division {
     /// The pieces that are cut off, those inside others first.
     pub pieces: Vec<Piece>,
     /// The faces along one side, where all pieces should be merged: with one at each side, a step
-    /// as short as the face is wide would remain between them.
+    /// as short as the face is wide would remain between them. None for pieces that do not follow
+    /// each other.
     pub along: Vec<usize>,
+    pub rest: Rest,
+}
+
+/// What becomes of a divided face without the pieces that are cut off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rest {
+    /// It is merged as well.
+    Merged,
+    /// It is a face of its own.
+    Kept,
 }
 
 /// How to divide faces of which `is_narrow`. Those with names are kept whole.
@@ -103,6 +114,7 @@ impl<'a> Strip<'a> {
             face: self.face,
             pieces: cuts.iter().map(|cut| self.piece(cut)).collect(),
             along: self.side(&cuts),
+            rest: Rest::Merged,
         })
     }
 

@@ -94,6 +94,18 @@ fn a_step_around_a_corner_is_divided_and_joins_the_faces_of_one_side() {
 }
 
 #[test]
+fn a_spur_of_a_wide_face_is_cut_off_and_joins_a_face_beside_it() {
+    let (facets, report) = merged("spur", 0.1);
+    let [tip] = &report.tips[..] else { panic!("{report:?}") };
+    assert!((tip.width - 1e-3).abs() < 1e-9 && report.faces.is_empty(), "{report:?}");
+    // Its corners at the end and at the cut are no corners of the mesh.
+    let [patches, _, corners] = counts(&facets.unwrap());
+    assert_eq!((patches, corners), (9, 13));
+    // With elements of its size it is kept.
+    assert!(merged("spur", 4e-3).1.tips.is_empty());
+}
+
+#[test]
 fn what_is_not_small_beside_the_elements_is_kept() {
     for (size, is_merged) in [(0.021, true), (0.019, false)] {
         let (facets, report) = merged("sliver_plate", size);

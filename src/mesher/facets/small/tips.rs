@@ -90,7 +90,7 @@ pub(super) fn candidates(layout: &Layout) -> Vec<Candidate> {
                 if a != b && one != other && is_sharp {
                     let tip = Piece { patch, of_loop, sides: [fin, next], at: [None; 2] };
                     let is_smooth = [a, b].iter().any(|&edge| is_smooth(layout, &[edge]));
-                    found.push(Candidate { tip, corner, is_smooth, attempt: 0 });
+                    found.push(Candidate { is_smooth, ..Candidate::of(tip, corner) });
                 }
             }
         }
@@ -129,14 +129,19 @@ pub(super) fn narrow(
 }
 
 /// A part of an edge: its index, and the parameters at both ends, ascending.
-type Part = (usize, [f64; 2]);
+pub(super) type Part = (usize, [f64; 2]);
 
-fn overlap(one: &[Part], other: &[Part]) -> bool {
+pub(super) fn overlap(one: &[Part], other: &[Part]) -> bool {
     let is_common = |(a, p): &Part, (b, q): &Part| a == b && p[0] < q[1] && q[0] < p[1];
     one.iter().any(|a| other.iter().any(|b| is_common(a, b)))
 }
 
 impl Candidate {
+    /// A corner of a face with sharp edges, which has not been cut yet.
+    pub(super) fn of(tip: Piece, corner: usize) -> Self {
+        Self { tip, corner, is_smooth: false, attempt: 0 }
+    }
+
     /// The face with the tip.
     pub(super) fn face(&self) -> usize {
         self.tip.patch
@@ -156,7 +161,7 @@ impl Candidate {
     }
 
     /// The tip, if it is at most as wide as elements divided by its factor for a while.
-    fn narrow(
+    pub(super) fn narrow(
         &self,
         layout: &Layout,
         size: &dyn SizeField,
@@ -173,7 +178,7 @@ impl Candidate {
 }
 
 /// The parts of its edges that belong to a tip.
-fn parts(model: &Model, tip: &Piece) -> Vec<Part> {
+pub(super) fn parts(model: &Model, tip: &Piece) -> Vec<Part> {
     let part = |fin: &Fin| match fin.on {
         On::Curve(curve) => Some((curve, model.curves[curve].range)),
         // A pole.
