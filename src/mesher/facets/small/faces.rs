@@ -1,8 +1,8 @@
 //! Which narrow face joins which neighbour.
 
 use super::Layout;
-use crate::Vector;
 use crate::ground::kernel::nearest::in_segment;
+use crate::{Point, Vector};
 use std::cmp::Ordering;
 
 /// A main face is at least this many times as wide as a face that joins it: slivers have 10⁻³ of
@@ -28,6 +28,9 @@ const ALONG: f64 = 0.25;
 
 /// Directions between faces turn by less than this where they are taken as smooth (radians).
 const SMOOTH: f64 = 0.1;
+
+/// The cosine of the angle between normals of a face that hardly turns, at least.
+const FLAT: f64 = 0.98;
 
 /// The face that a narrow one joins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -146,6 +149,32 @@ pub(super) fn is_smooth(layout: &Layout, common: &[usize]) -> bool {
     layout.segments(common).all(|segment| {
         let into: Vec<Vector> = layout.faces_beside(segment).map(|(_, into)| into).collect();
         matches!(into[..], [a, b] if a.angle(&-b) < SMOOTH)
+    })
+}
+
+/// Whether a narrow face goes on smoothly beyond its edges with the main one, and hardly turns from
+/// there to its other side: without it the shape is almost the same.
+pub(super) fn continues(layout: &Layout, face: usize, main: usize) -> bool {
+    let common: Vec<usize> = (layout.around[face].iter().copied())
+        .filter(|edge| matches!(layout.faces_of[*edge][..], [a, b] if [a, b].contains(&main) && a != b))
+        .collect();
+    if common.is_empty() || !is_smooth(layout, &common) {
+        return false;
+    }
+    // The middles of the common segments, with the normal of the main face.
+    let normal = |segment: [u32; 2]| {
+        let [p, q] = layout.ends(segment);
+        let (_, into) = layout.faces_beside(segment).find(|(other, _)| *other == main)?;
+        Some((nalgebra::center(&p, &q), (q - p).cross(&into).try_normalize(0.0)?))
+    };
+    let normals: Vec<(Point, Vector)> = layout.segments(&common).filter_map(normal).collect();
+    layout.triangles[face].iter().all(|corners| {
+        let [a, b, c] = corners;
+        let middle = Point::from((a.coords + b.coords + c.coords) / 3.0);
+        let distance = |(p, _): &&(Point, Vector)| (p - middle).norm_squared();
+        let nearest = normals.iter().min_by(|s, t| distance(s).total_cmp(&distance(t)));
+        let own = (b - a).cross(&(c - a)).try_normalize(0.0);
+        nearest.zip(own).is_none_or(|((_, normal), own)| own.dot(normal).abs() >= FLAT)
     })
 }
 

@@ -1,7 +1,7 @@
 //! Groups of faces and edges, chosen by their sizes and the size of the elements.
 
 use super::chains::{Chain, chains};
-use super::faces::{Joins, joins};
+use super::faces::{Joins, continues, joins};
 use super::layout::Layout;
 use super::report::{MergedEdge, MergedFace, MergedSmall, NamedFace};
 use crate::Point;
@@ -60,8 +60,9 @@ pub(super) struct Allowed {
 }
 
 impl Allowed {
-    /// Faces and edges far smaller than one of their neighbours, at most of this width or length.
-    pub fn of(layout: &Layout, most: f64) -> Self {
+    /// Faces and edges far smaller than one of their neighbours and than the largest elements.
+    pub fn of(layout: &Layout, small: &Small) -> Self {
+        let most = small.largest / small.factor;
         let mut longest = vec![0.0_f64; layout.model.corners.len()];
         for &edge in &layout.curves {
             for end in layout.model.curves[edge].ends {
@@ -76,13 +77,18 @@ impl Allowed {
         };
         let mut edges = vec![false; layout.lengths.len()];
         layout.curves.iter().for_each(|&edge| edges[edge] = is_short(edge));
+        // A face that hardly turns may be as wide as a tip that does not.
+        let is_bend = |face: usize| {
+            small.tip_factors[1] * layout.widths[face] <= small.largest
+                && beside(layout, face).any(|main| main != face && continues(layout, face, main))
+        };
         let mut faces = vec![false; layout.around.len()];
         loop {
             // The corner between rounded edges has only narrow faces beside it.
             let before = faces.clone();
             for face in (0..faces.len()).filter(|&face| !before[face]) {
-                faces[face] = layout.widths[face] <= most
-                    && LONGER * layout.widths[face] <= widest_near(layout, face, &before);
+                faces[face] = LONGER * layout.widths[face] <= widest_near(layout, face, &before)
+                    && (layout.widths[face] <= most || is_bend(face));
             }
             if faces == before {
                 return Self { faces, edges };
@@ -91,12 +97,15 @@ impl Allowed {
     }
 }
 
+/// The faces at the edges of a face, with itself.
+fn beside(layout: &Layout, face: usize) -> impl Iterator<Item = usize> {
+    layout.around[face].iter().flat_map(|&edge| layout.faces_of[edge].iter().copied())
+}
+
 /// The width of the widest face beside a face, or beside one of its narrow neighbours.
 fn widest_near(layout: &Layout, face: usize, is_narrow: &[bool]) -> f64 {
-    let beside =
-        |face: usize| layout.around[face].iter().flat_map(|&edge| layout.faces_of[edge].iter().copied());
-    let near = beside(face).flat_map(|other| {
-        let beyond = is_narrow[other].then(|| beside(other));
+    let near = beside(layout, face).flat_map(|other| {
+        let beyond = is_narrow[other].then(|| beside(layout, other));
         std::iter::once(other).chain(beyond.into_iter().flatten())
     });
     near.map(|other| layout.widths[other]).fold(0.0, f64::max)
@@ -142,7 +151,7 @@ impl Outcome {
 /// larger, so faces and edges are taken out until all that are left are small.
 pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> Outcome {
     let (model, tessellation) = (layout.model, layout.tessellation);
-    let mut allowed = Allowed::of(layout, small.largest / small.factor);
+    let mut allowed = Allowed::of(layout, small);
     for cut in &layout.cuts {
         (allowed.faces[cut.tip], allowed.edges[cut.edge]) = (true, true);
     }
@@ -180,7 +189,13 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> Outcom
                 // It is narrower elsewhere.
                 Some(cut) => is_small(points_of_edge(cut.edge), merged.width, tip_factor),
                 // Elements may be smaller where it is narrower.
-                None => layout.local_widths[face].iter().all(|(p, width)| factor * width <= size.size_at(p)),
+                None => {
+                    let factor = match continues(layout, face, merged.into - 1) {
+                        true => factor.min(small.tip_factors[1]),
+                        false => factor,
+                    };
+                    layout.local_widths[face].iter().all(|(p, width)| factor * width <= size.size_at(p))
+                }
             };
             if !is_narrow {
                 (allowed.faces[face], are_all_small) = (false, false);

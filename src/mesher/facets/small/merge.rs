@@ -25,7 +25,7 @@ const MERGES: usize = 3;
 pub fn merge(model: &Model, tessellation: &Tessellation, small: &Small) -> (Option<Merged>, MergedSmall) {
     let shape = Shape::new(model, tessellation);
     let layout = Layout::new(model, tessellation, &shape);
-    let allowed = Allowed::of(&layout, small.largest / small.factor);
+    let allowed = Allowed::of(&layout, small);
     let mut divisions = divisions(&layout, &allowed.faces);
     divisions.extend(spurs(&layout, &allowed, &divisions));
     while !divisions.is_empty() && !small.work.is_cancelled() {

@@ -106,9 +106,19 @@ fn a_spur_of_a_wide_face_is_cut_off_and_joins_a_face_beside_it() {
 }
 
 #[test]
+fn a_face_that_hardly_turns_joins_a_smooth_neighbour_at_the_size_of_tips() {
+    // A strip 0.03 wide between two planes.
+    let strips = |size: f64| merged("soft_bend", size).1.faces.len();
+    assert_eq!([0.1, 0.15, 0.7].map(strips), [0, 1, 1]);
+    // One 0.001 wide beside a coplanar face.
+    let slivers = |size: f64| merged("sliver_plate", size).1.faces.len();
+    assert_eq!([0.0039, 0.0041].map(slivers), [0, 1]);
+}
+
+#[test]
 fn what_is_not_small_beside_the_elements_is_kept() {
-    for (size, is_merged) in [(0.021, true), (0.019, false)] {
-        let (facets, report) = merged("sliver_plate", size);
+    for (size, is_merged) in [(0.029, true), (0.027, false)] {
+        let (facets, report) = merged("tiny_chamfer", size);
         assert_eq!(facets.is_some(), is_merged);
         assert_eq!(report == MergedSmall::default(), !is_merged, "{report:?}");
     }
