@@ -77,7 +77,7 @@ impl Model {
         let mut divisions: Vec<Vec<(f64, usize)>> = vec![Vec::new(); self.curves.len()];
         let ends: Vec<[usize; 2]> =
             pieces.iter().map(|piece| self.ends_of_cut(piece, &mut model.corners, &mut divisions)).collect();
-        for (edge, at) in self.curves.iter().zip(&mut divisions) {
+        for (edge, at) in self.curves.iter().zip(&mut divisions).filter(|(_, at)| !at.is_empty()) {
             at.sort_by(|a, b| a.0.total_cmp(&b.0));
             let ends = edge.range.map(|t| (t, 0));
             let places = [&ends[..1], at, &ends[1..]].concat();

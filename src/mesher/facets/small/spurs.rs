@@ -22,9 +22,10 @@ const WIDER: f64 = 2.0;
 /// The sum of the angles at its end differs from that of parallel sides by at most this (radians).
 const PARALLEL: f64 = 0.35;
 
-/// Spurs are followed in eighths of this share of their shorter side, and at most [`LONG`] times
-/// their width.
+/// A spur is as long as a tip must be beside elements of the larger of these sizes: this share of
+/// its shorter side, ...
 const SHARE: f64 = 0.25;
+/// ... and so many times its width.
 const LONG: f64 = 25.0;
 
 /// Faces with spurs that end in edges that may be merged, unless they are narrow altogether or
