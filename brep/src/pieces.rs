@@ -167,8 +167,11 @@ impl Model {
     }
 
     /// The curve of a side, and the corner at its start or end.
-    fn end_of(&self, fin: &Fin, at_start: bool) -> (usize, usize) {
-        let On::Curve(curve) = fin.on else { panic!("a side at a cut is a curve") };
+    ///
+    /// # Panics
+    /// If the side is a pole of the surface, which is no curve.
+    pub fn end_of(&self, fin: &Fin, at_start: bool) -> (usize, usize) {
+        let On::Curve(curve) = fin.on else { panic!("the side is a pole") };
         (curve, self.curves[curve].ends[usize::from(fin.is_forward != at_start)])
     }
 }

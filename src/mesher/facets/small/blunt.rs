@@ -39,59 +39,68 @@ pub(super) fn blunt(
     without: impl FnOnce(&[BluntEnd]) -> Box<dyn SizeField>,
 ) -> Vec<(usize, BluntEnd)> {
     let largest = UniformSize(small.largest);
-    // With whether the radius vanishes.
-    let mut all: Vec<(usize, BluntEnd, bool)> = Vec::new();
-    for (k, candidate) in candidates.iter().enumerate() {
-        let Some(end) = end(layout, candidate, &largest, small.factor) else { continue };
-        let vanishes = radius_vanishes(layout, candidate, end.length);
-        if vanishes || has_bends(layout, candidate, end.length) {
-            all.push((k, end, vanishes));
+    let mut wedges: Vec<(Wedge, BluntEnd)> = Vec::new();
+    for (index, candidate) in candidates.iter().enumerate() {
+        let mut wedge = Wedge { index, candidate, sides: candidate.sides(layout), vanishes: false };
+        let Some(end) = wedge.end(&largest, small.factor) else { continue };
+        wedge.vanishes = wedge.radius_vanishes(layout, end.length);
+        if wedge.vanishes || wedge.has_bends(end.length) {
+            wedges.push((wedge, end));
         }
     }
-    if all.is_empty() {
+    if wedges.is_empty() {
         return Vec::new();
     }
-    let larger = without(&all.iter().map(|(_, end, _)| *end).collect::<Vec<_>>());
-    let narrow = |(k, _, vanishes): (usize, BluntEnd, bool)| {
-        let factor = if vanishes { small.factor } else { small.factor / FURTHER };
-        let candidate = &candidates[k];
-        let at = end(layout, candidate, &*larger, factor)?;
+    let larger = without(&wedges.iter().map(|(_, end)| *end).collect::<Vec<_>>());
+    let narrow = |(wedge, _): &(Wedge, BluntEnd)| {
+        let factor = if wedge.vanishes { small.factor } else { small.factor / FURTHER };
+        let end = wedge.end(&*larger, factor)?;
         let is_longer = || {
-            let length = end(layout, candidate, size, factor).map_or(0.0, |end| end.length);
-            at.length >= LONGER * length && has_bends(layout, candidate, at.length)
+            let length = wedge.end(size, factor).map_or(0.0, |end| end.length);
+            end.length >= LONGER * length && wedge.has_bends(end.length)
         };
-        (vanishes || is_longer()).then_some((k, at))
+        (wedge.vanishes || is_longer()).then_some((wedge.index, end))
     };
-    all.into_iter().filter_map(narrow).collect()
+    wedges.iter().filter_map(narrow).collect()
 }
 
-/// The end of a face where it is at most as wide as elements divided by a factor, if it is.
-fn end(layout: &Layout, candidate: &Candidate, size: &dyn SizeField, factor: f64) -> Option<BluntEnd> {
-    let [one, other] = candidate.sides(layout);
-    let across = last_narrow(&one, &other, size, factor)?;
-    let corner = one.tip();
-    let length = across.places.map(|place| (place.point - corner).norm()).into_iter().fold(0.0, f64::max);
-    Some(BluntEnd { patch: candidate.face(), corner, length })
+/// A face at a candidate, between two sides that meet in a tip.
+struct Wedge<'a> {
+    index: usize,
+    candidate: &'a Candidate,
+    sides: [Side<'a>; 2],
+    /// Whether the radius of the face vanishes there.
+    vanishes: bool,
 }
 
-/// Whether the radius of a face becomes smaller and smaller towards a tip.
-fn radius_vanishes(layout: &Layout, candidate: &Candidate, length: f64) -> bool {
-    let patch = &layout.model.patches[candidate.face()];
-    if patch.surface.is_plane() {
-        return false;
+impl Wedge<'_> {
+    /// The end of the face where it is at most as wide as elements divided by a factor, if it is.
+    fn end(&self, size: &dyn SizeField, factor: f64) -> Option<BluntEnd> {
+        let [one, other] = &self.sides;
+        let across = last_narrow(one, other, size, factor)?;
+        let corner = one.tip();
+        let length = across.places.map(|place| (place.point - corner).norm()).into_iter().fold(0.0, f64::max);
+        Some(BluntEnd { patch: self.candidate.face(), corner, length })
     }
-    let [side, _] = candidate.sides(layout);
-    let curvature = |share: f64| {
-        let (fin, at) = side.at_distance(share * length)?;
-        let [u, v] = candidate.parameters(layout.model, fin, at)?;
-        patch.surface.jet(u, v, 2).curvature()
-    };
-    let [Some(far), Some(near)] = SHARES.map(curvature) else { return false };
-    near >= GROWTH * far
-}
 
-/// Whether a side of a face goes on over several edges within so much of a tip.
-fn has_bends(layout: &Layout, candidate: &Candidate, length: f64) -> bool {
-    let edge = |side: &Side, distance: f64| side.at_distance(distance).map(|(edge, _)| edge);
-    candidate.sides(layout).iter().any(|side| edge(side, length) != edge(side, 0.0))
+    /// Whether the radius of the face becomes smaller and smaller towards the tip.
+    fn radius_vanishes(&self, layout: &Layout, length: f64) -> bool {
+        let patch = &layout.model.patches[self.candidate.face()];
+        if patch.surface.is_plane() {
+            return false;
+        }
+        let curvature = |share: f64| {
+            let (fin, at) = self.sides[0].at_distance(share * length)?;
+            let [u, v] = self.candidate.parameters(layout.model, fin, at)?;
+            patch.surface.jet(u, v, 2).curvature()
+        };
+        let [Some(far), Some(near)] = SHARES.map(curvature) else { return false };
+        near >= GROWTH * far
+    }
+
+    /// Whether a side goes on over several edges within so much of the tip.
+    fn has_bends(&self, length: f64) -> bool {
+        let edge = |side: &Side, distance: f64| side.at_distance(distance).map(|(edge, _)| edge);
+        self.sides.iter().any(|side| edge(side, length) != edge(side, 0.0))
+    }
 }

@@ -152,22 +152,24 @@ pub(super) fn is_smooth(layout: &Layout, common: &[usize]) -> bool {
     })
 }
 
-/// Whether a narrow face goes on smoothly beyond its edges with the main one, and hardly turns from
-/// there to its other side: without it the shape is almost the same.
-pub(super) fn continues(layout: &Layout, face: usize, main: usize) -> bool {
-    let common: Vec<usize> = (layout.around[face].iter().copied())
-        .filter(|edge| matches!(layout.faces_of[*edge][..], [a, b] if [a, b].contains(&main) && a != b))
-        .collect();
-    if common.is_empty() || !is_smooth(layout, &common) {
-        return false;
-    }
+/// The neighbours with which a narrow face goes on smoothly beyond its edges, if it hardly turns
+/// from there to its other side: without it the shape is almost the same.
+pub(super) fn continued(layout: &Layout, face: usize) -> impl Iterator<Item = usize> {
+    let is_continued = move |(main, common): &(usize, Vec<usize>)| {
+        is_smooth(layout, common) && hardly_turns(layout, face, *main, common)
+    };
+    neighbours(layout, face).into_iter().filter(is_continued).map(|(main, _)| main)
+}
+
+/// Whether the normals of a face are those of the main one at the nearest of their common edges.
+fn hardly_turns(layout: &Layout, face: usize, main: usize, common: &[usize]) -> bool {
     // The middles of the common segments, with the normal of the main face.
     let normal = |segment: [u32; 2]| {
         let [p, q] = layout.ends(segment);
         let (_, into) = layout.faces_beside(segment).find(|(other, _)| *other == main)?;
         Some((nalgebra::center(&p, &q), (q - p).cross(&into).try_normalize(0.0)?))
     };
-    let normals: Vec<(Point, Vector)> = layout.segments(&common).filter_map(normal).collect();
+    let normals: Vec<(Point, Vector)> = layout.segments(common).filter_map(normal).collect();
     layout.triangles[face].iter().all(|corners| {
         let [a, b, c] = corners;
         let middle = Point::from((a.coords + b.coords + c.coords) / 3.0);

@@ -1,7 +1,7 @@
 //! Groups of faces and edges, chosen by their sizes and the size of the elements.
 
 use super::chains::{Chain, chains};
-use super::faces::{Joins, continues, joins};
+use super::faces::{Joins, continued, joins};
 use super::layout::Layout;
 use super::report::{MergedEdge, MergedFace, MergedSmall, NamedFace};
 use crate::Point;
@@ -80,7 +80,7 @@ impl Allowed {
         // A face that hardly turns may be as wide as a tip that does not.
         let is_bend = |face: usize| {
             small.tip_factors[1] * layout.widths[face] <= small.largest
-                && beside(layout, face).any(|main| main != face && continues(layout, face, main))
+                && continued(layout, face).next().is_some()
         };
         let mut faces = vec![false; layout.around.len()];
         loop {
@@ -97,15 +97,12 @@ impl Allowed {
     }
 }
 
-/// The faces at the edges of a face, with itself.
-fn beside(layout: &Layout, face: usize) -> impl Iterator<Item = usize> {
-    layout.around[face].iter().flat_map(|&edge| layout.faces_of[edge].iter().copied())
-}
-
 /// The width of the widest face beside a face, or beside one of its narrow neighbours.
 fn widest_near(layout: &Layout, face: usize, is_narrow: &[bool]) -> f64 {
-    let near = beside(layout, face).flat_map(|other| {
-        let beyond = is_narrow[other].then(|| beside(layout, other));
+    let beside =
+        |face: usize| layout.around[face].iter().flat_map(|&edge| layout.faces_of[edge].iter().copied());
+    let near = beside(face).flat_map(|other| {
+        let beyond = is_narrow[other].then(|| beside(other));
         std::iter::once(other).chain(beyond.into_iter().flatten())
     });
     near.map(|other| layout.widths[other]).fold(0.0, f64::max)
@@ -190,10 +187,8 @@ pub(super) fn merge_all(shape: &Shape, layout: &Layout, small: &Small) -> Outcom
                 Some(cut) => is_small(points_of_edge(cut.edge), merged.width, tip_factor),
                 // Elements may be smaller where it is narrower.
                 None => {
-                    let factor = match continues(layout, face, merged.into - 1) {
-                        true => factor.min(small.tip_factors[1]),
-                        false => factor,
-                    };
+                    let is_bend = continued(layout, face).any(|main| main == merged.into - 1);
+                    let factor = if is_bend { factor.min(small.tip_factors[1]) } else { factor };
                     layout.local_widths[face].iter().all(|(p, width)| factor * width <= size.size_at(p))
                 }
             };

@@ -261,17 +261,13 @@ fn divided_of_file(report: MergedSmall, model: &Model, cut: &Cut, divisions: &[D
         let (face, into, width) = (of_file(merged.face), of_file(merged.into), merged.width);
         match spurs.get(&merged.face) {
             None => out.faces.push(MergedFace { face, into, ..merged }),
-            Some(spur) => out.tips.push(MergedTip { face, into, point: end_of(spur, model), width }),
+            Some(spur) => {
+                let (_, end) = model.end_of(spur.sides(model)[0], false);
+                out.tips.push(MergedTip { face, into, point: model.corners[end].point.into(), width });
+            }
         }
     }
     out
-}
-
-/// The corner at the end of a spur.
-fn end_of(spur: &Piece, model: &Model) -> [f64; 3] {
-    let [arriving, _] = spur.sides(model);
-    let On::Curve(edge) = arriving.on else { panic!("the sides of a spur are edges") };
-    model.corners[model.curves[edge].ends[usize::from(arriving.is_forward)]].point.into()
 }
 
 /// Merged edges in the numbers of the file, which has no cuts: parts of an edge have its number.

@@ -31,6 +31,9 @@ const LONG: f64 = 25.0;
 /// Faces with spurs that end in edges that may be merged, unless they are narrow altogether or
 /// along faces that are `divided`.
 pub(super) fn spurs(layout: &Layout, allowed: &Allowed, divided: &[Division]) -> Vec<Division> {
+    if !allowed.edges.contains(&true) {
+        return Vec::new();
+    }
     let triangles = layout.tessellation.triangles.iter().map(|t| (t.vertices, t.patch));
     let corners = layout.model.corners.len();
     let angles = angles(&layout.tessellation.points, triangles, |v| (v as usize) < corners);

@@ -85,7 +85,7 @@ pub(super) fn candidates(layout: &Layout) -> Vec<Candidate> {
                 let (Some((a, one)), Some((b, other))) = (beyond(arriving), beyond(&fins[next])) else {
                     continue;
                 };
-                let corner = model.curves[a].ends[usize::from(arriving.is_forward)];
+                let (_, corner) = model.end_of(arriving, false);
                 let is_sharp = angles.get(&(corner as u32, patch as u32)).is_some_and(|angle| *angle < SHARP);
                 if a != b && one != other && is_sharp {
                     let tip = Piece { patch, of_loop, sides: [fin, next], at: [None; 2] };
