@@ -17,6 +17,8 @@ pub(crate) struct Loop {
 
 /// The first step, as a fraction of the edge.
 const FIRST_STEP: f64 = 1.0 / 16.0;
+/// Steps that may end at another foot of an edge than the one beside the last, as a fraction of it.
+const LONG_STEP: f64 = 1.0 / 256.0;
 /// The smallest step, as a fraction of the edge.
 const SMALLEST_STEP: f64 = 1e-7;
 /// The largest distance of the middle of a step from the edge, as a fraction of the step.
@@ -190,8 +192,9 @@ impl Chart<'_> {
             let middle = self.surface.point([0, 1].map(|i| 0.5 * (at[i] + found[i])));
             let bend = (middle - point(edge, 0.5 * (t + next))).norm();
             let little = OFF * chord + ROUNDING * self.diagonal;
-            // Beyond their knots splines continue, and a long step may end at a foot there.
-            let is_near = || off <= gap + little || off <= 2.0 * self.distance(&place);
+            // Beyond their knots splines continue, and a long step may end at a foot there. After a short
+            // one the foot is beside the one before, and further off only as the edge is.
+            let is_near = || step < LONG_STEP || off <= gap + little || off <= 2.0 * self.distance(&place);
             let is_good = bend <= off.max(gap) + little && is_near();
             if is_good || step < SMALLEST_STEP {
                 if off > AWAY * self.diagonal {
@@ -298,6 +301,28 @@ mod tests {
             assert!(nodes.iter().all(|node| (-0.01..=1.01).contains(&node.1[0])), "{nodes:?}");
         }
     }
+
+    #[test]
+    fn an_edge_beyond_the_end_of_a_small_surface_is_followed_along_that() {
+        // From inside to a tenth of the surface beyond its end.
+        let (around, wall) = wall(0.25);
+        let at = |k: u32| {
+            let share = f64::from(k) / 16.0;
+            around.point(0.9 + 0.2 * share) + Vector::z() * share
+        };
+        let points: Vec<Vector> = (0..=16).map(at).collect();
+        let knots: Vec<f64> = (0..=16).map(|k| f64::from(k) / 16.0).collect();
+        let edge =
+            EdgeCurve { curve: spline(1, &knots, points), range: [0.0, 1.0], ends: [0, 1], tolerance: 0.0 };
+        // So little is the accuracy of a large model.
+        let Ok((nodes, gap)) = Chart::new(&wall, 1e4).walk(&edge, [0.0, 1.0], [0.9, 0.0]) else {
+            panic!("lost")
+        };
+        let beyond = (point(&edge, 1.0).coords - around.point(1.0) - Vector::z()).norm();
+        assert!(gap <= 1.01 * beyond, "{gap}, {beyond}");
+        assert!(nodes.len() < 2_000 && nodes[nodes.len() - 1].1[0] >= 1.0, "{}", nodes.len());
+    }
+
     #[test]
     fn a_point_at_the_end_of_a_surface_is_not_found_across_a_slit() {
         let (around, wall) = wall(0.9999);
