@@ -328,3 +328,25 @@ fn solids_that_overlap_are_refused_by_number() {
     let error = tessellated(&mut model).expect_err("a block inside of another one");
     assert!(matches!(&error, BrepError::Solid { solid: 2, what, .. } if what.contains("solid 1")), "{error}");
 }
+
+#[test]
+fn an_edge_longer_than_its_narrow_face_ends_at_the_next_one() {
+    const WIDTH: f64 = 0.01;
+    for share in [0.03_f64, -0.03] {
+        let mut solids = Solids::default();
+        solids.block([0.0; 3], [WIDTH, 1.0, 1.0]);
+        let mut shapes = solids.into_shapes();
+        // The corners of the file are within its accuracy.
+        shapes.corners.iter_mut().for_each(|corner| corner.tolerance = share.abs() * WIDTH);
+        for edge in &mut shapes.curves {
+            let way = edge.curve.point(edge.range[1]) - edge.curve.point(edge.range[0]);
+            if way.cross(&X).norm() == 0.0 {
+                edge.range[1] += share;
+            }
+        }
+        let mut model = Model { bodies: 1, ..Model::default() };
+        shapes.build(&mut model).unwrap();
+        let (_, volumes, _) = measured(model);
+        assert!((volumes[0] / WIDTH - 1.0).abs() < 0.05, "{volumes:?}");
+    }
+}

@@ -1,8 +1,9 @@
 //! The loops of a patch as points in its parameters.
 
 use super::Tessellation;
+use super::cross::cut;
 use super::face::Tolerances;
-use crate::model::{EdgeCurve, Fin, Model, On};
+use crate::model::{Corner, EdgeCurve, Fin, Model, On, Patch};
 use crate::project::project_to_surface;
 use crate::{BrepError, Point, Surface};
 
@@ -50,38 +51,66 @@ pub(super) fn chain(
         sides[before].last_mut().expect("a side has two nodes or more").0 = start;
         sides[after][0].0 = end;
     }
+    join(patch, number, sides, out, (&model.corners, tolerances)).map(|sides| (sides, most_gap))
+}
+
+/// Joins sides where their ends differ in the parameters. Each side ends before the next then.
+fn join(
+    patch: &Patch,
+    number: usize,
+    mut sides: Vec<Chain>,
+    out: &Tessellation,
+    (corners, tolerances): (&[Corner], &Tolerances),
+) -> Result<Sides, BrepError> {
     let extents = [0, 1].map(|i| {
         let along = sides.iter().flatten().map(|node| node.0[i]);
         along.clone().fold(f64::NEG_INFINITY, f64::max) - along.fold(f64::INFINITY, f64::min)
     });
-    let mut out_sides = Sides::new();
+    let point = |p: [f64; 2]| patch.surface.point(p);
+    // The ends of sides without length between sides and the next ones.
+    let mut between = Vec::new();
     for k in 0..sides.len() {
-        let side = &sides[k];
-        let next = &sides[(k + 1) % sides.len()][0];
-        let (end, vertex) = side[side.len() - 1];
-        out_sides.push(side[..side.len() - 1].to_vec());
-        // Ends that differ in parameters but not in space are joined by a side without length.
-        let middle = [0, 1].map(|i| 0.5 * (end[i] + next.0[i]));
-        let [from, half, to] = [end, middle, next.0].map(|p| patch.surface.point(p));
+        let after = (k + 1) % sides.len();
+        let (end, vertex) = sides[k][sides[k].len() - 1];
+        let next = sides[after][0].0;
+        let middle = [0, 1].map(|i| 0.5 * (end[i] + next[i]));
+        let [from, half, to] = [end, middle, next].map(point);
         let gap = (half - from).norm().max((to - from).norm());
-        let corner = out.points[vertex as usize];
-        let tolerance = model.corners[vertex as usize].tolerance;
-        let most = (10.0 * tolerance).max(1e-5 * tolerances.diagonal);
+        let corner = &corners[vertex as usize];
+        let most = (10.0 * corner.tolerance).max(1e-5 * tolerances.diagonal);
         if gap > most {
             let what =
                 format!("its edges do not join in the parameters of its surface: the gap is {gap:.3e}");
-            return Err(BrepError::face(number, what, Some(corner)));
+            return Err(BrepError::face(number, what, Some(out.points[vertex as usize])));
+        }
+        between.push(None);
+        // Where files are not accurate, sides may cross before their ends.
+        if gap > 1e-9 * tolerances.diagonal && k != after {
+            let mut one = std::mem::take(&mut sides[k]);
+            let is_cut = cut(&mut one, &mut sides[after], point, most);
+            sides[k] = one;
+            if is_cut {
+                continue;
+            }
         }
         let rate = patch.surface.jet(end[0], end[1], 1);
         let is_pole = [rate.d[1][0], rate.d[0][1]].iter().any(|d| d.norm() < 1e-7 * tolerances.diagonal);
-        let apart = [0, 1].map(|i| (end[i] - next.0[i]).abs());
+        let apart = [0, 1].map(|i| (end[i] - next[i]).abs());
         let is_side = (0..2).any(|i| apart[i] > SIDE * extents[i]);
         if is_side || (is_pole && apart[0].hypot(apart[1]) > 1e-6) {
-            let at = |share: f64| ([0, 1].map(|j| end[j] + share * (next.0[j] - end[j])), vertex);
-            out_sides.push((0..AT_POLE).map(|i| at(i as f64 / AT_POLE as f64)).collect());
+            between[k] = Some([end, next]);
         }
     }
-    Ok((out_sides, most_gap))
+    let mut joined = Sides::new();
+    for (mut side, between) in sides.into_iter().zip(between) {
+        let vertex = side.pop().expect("a side has two nodes or more").1;
+        joined.push(side);
+        if let Some([end, next]) = between {
+            let at = |share: f64| ([0, 1].map(|j| end[j] + share * (next[j] - end[j])), vertex);
+            joined.push((0..AT_POLE).map(|i| at(i as f64 / AT_POLE as f64)).collect());
+        }
+    }
+    Ok(joined)
 }
 
 fn at_pole(fin: &Fin, vertex: u32) -> Chain {

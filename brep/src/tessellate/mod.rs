@@ -6,6 +6,7 @@
 //! not depend on the number of threads.
 
 mod chain;
+mod cross;
 mod curves;
 mod face;
 mod frame;
