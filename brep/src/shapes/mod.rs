@@ -8,7 +8,7 @@ mod overlap;
 mod split;
 #[cfg(test)]
 mod tests;
-mod twisted;
+mod without_area;
 
 pub(crate) use enclose::left_out;
 
@@ -178,7 +178,8 @@ impl Shapes {
         if let Some((_, error)) = self.away.drain(..).find(|(off, _)| *off > AWAY * size) {
             return Err(error);
         }
-        model.notes.extend(twisted::drop_twisted(&mut self, size));
+        model.notes.extend(without_area::drop_twisted(&mut self, size));
+        model.notes.extend(without_area::drop_planes_without_edges(&mut self));
         glue::glue_edges(&mut self, size, glue::OF_SOLIDS);
         split::divide_at_poles(&mut self, size);
         model.notes.extend(split::drop_spurs(&mut self));

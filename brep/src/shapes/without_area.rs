@@ -1,8 +1,10 @@
-//! Twisted faces: their two edges cross each other, so that they bound nothing.
+//! Faces that bound nothing: twisted ones, whose two edges cross each other, and plane ones without
+//! edges.
 //!
-//! Some programs leave such a face where two others should meet along one edge. Without it they do.
+//! Some programs leave such a face where two others should meet along one edge, or at one vertex.
+//! Without it they do.
 
-use super::Shapes;
+use super::{Face, Shapes};
 use crate::Point;
 use crate::model::AWAY;
 use crate::nearest::nearest_on_surface;
@@ -14,6 +16,15 @@ const PLACES: usize = 32;
 /// Edges cross if they are on both sides of each other by at least this share of their largest
 /// distance.
 const BOTH_SIDES: f64 = 0.05;
+
+/// Drops plane faces whose edges had no length. Returns a note if there are any.
+pub(super) fn drop_planes_without_edges(shapes: &mut Shapes) -> Option<String> {
+    let is_one = |face: &Face| face.surface.is_plane() && face.loops.is_empty();
+    let dropped = shapes.faces.iter().filter(|face| is_one(face)).count();
+    let first = shapes.faces.iter().position(is_one)? + 1;
+    shapes.faces.retain(|face| !is_one(face));
+    Some(format!("{dropped} faces whose edges have no length are left out, the first of them face {first}"))
+}
 
 /// Drops twisted faces whose edges are no further apart than edges may be from their faces; the two
 /// edges of each become one. Returns notes.

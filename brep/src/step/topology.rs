@@ -215,7 +215,13 @@ impl<'s> Reader<'s> {
         }
         let fields = edge.fields("EDGE_CURVE")?;
         let ends = [self.vertex(fields.refers(1)?)?, self.vertex(fields.refers(2)?)?];
-        let own = curve(fields.refers(3)?)?.placed(&self.placement);
+        let of = fields.refers(3)?;
+        if ends[0] == ends[1] && of.is("LINE") {
+            // Some programs write no direction of it.
+            self.curves.insert(edge.id, None);
+            return Ok(None);
+        }
+        let own = curve(of)?.placed(&self.placement);
         let is_along = fields.flag(4)?;
         let made = match self.range(edge, &own, ends, is_along)? {
             None => None,

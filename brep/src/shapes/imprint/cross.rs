@@ -132,7 +132,9 @@ fn apply(shapes: &mut Shapes, divisions: Divisions, size: f64) {
         places.sort_by(|a, b| a.0.total_cmp(&b.0));
         let room = AT_END * SAME * size;
         let is_apart = |a: usize, b: usize| (shapes.corners[a].point - shapes.corners[b].point).norm() > room;
-        places.dedup_by(|a, b| !is_apart(a.1, b.1));
+        // Corners further apart may have the same place on a curve beside both.
+        let on = |at: f64| Point::from(shapes.curves[curve].curve.point(at));
+        places.dedup_by(|a, b| !is_apart(a.1, b.1) || (on(a.0) - on(b.0)).norm() <= room);
         // From the end: the first part keeps the index.
         for (at, corner) in places.into_iter().rev() {
             let on = Point::from(shapes.curves[curve].curve.point(at));
@@ -290,4 +292,25 @@ fn nearest_pair(edges: [&EdgeCurve; 2], mut at: [f64; 2]) -> ([f64; 2], [Point; 
         at = next;
     }
     (at, [0, 1].map(|k| Point::from(edges[k].curve.point(at[k]))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shapes::tests::{Solids, Y};
+
+    #[test]
+    fn corners_at_one_place_of_a_curve_divide_it_once() {
+        let mut solids = Solids::default();
+        solids.block([0.0; 3], [1.0; 3]);
+        let mut shapes = solids.into_shapes();
+        let (curve, count) = (0, shapes.curves.len());
+        let on = Point::from(shapes.curves[curve].curve.point(0.3));
+        let corners =
+            [0.0, 1e-3].map(|by| shapes.add_corner(Corner { point: on + Y * by, tolerance: 1e-3 }, 0));
+        let places = [(0.3, corners[0]), (0.3, corners[1])];
+        apply(&mut shapes, Divisions::from([(curve, places.to_vec())]), 1.0);
+        assert_eq!(shapes.curves.len(), count + 1);
+        assert!(shapes.curves.iter().all(|edge| edge.range[0] < edge.range[1]));
+    }
 }

@@ -163,6 +163,23 @@ fn an_edge_into_a_plane_and_back_is_left_out() {
     assert_eq!(model.notes.len(), 1, "{:?}", model.notes);
 }
 
+#[test]
+fn an_edge_and_a_face_without_length_are_left_out() {
+    let mut text = Text::new();
+    let faces = cylinder(&mut text, true);
+    let point = text.point(1.0, 0.0, 2.0);
+    let vertex = text.add(&format!("VERTEX_POINT('',#{point})"));
+    let direction = text.add("DIRECTION('',(0.,0.,0.))");
+    let vector = text.add(&format!("VECTOR('',#{direction},0.)"));
+    let line = text.add(&format!("LINE('',#{point},#{vector})"));
+    let edge = text.add(&format!("EDGE_CURVE('',#{vertex},#{vertex},#{line},.T.)"));
+    let none = text.disk(edge, 2.0, true);
+    let (model, volumes) = volumes(&text.solid(&[faces[0], faces[1], faces[2], none]), Unit::OfFile);
+    assert_near(volumes[0], 2.0 * PI);
+    assert!(model.notes[0].starts_with("1 faces whose edges have no length"), "{:?}", model.notes);
+    assert_eq!(model.patches.len(), 3);
+}
+
 /// The faces of a unit cube with edges of its own; vertices at the same place are shared.
 fn cube(text: &mut Text, origin: [f64; 3], vertices: &mut HashMap<[i32; 3], u32>) -> Vec<u32> {
     let mut edges: HashMap<[u32; 2], u32> = HashMap::new();
