@@ -85,7 +85,7 @@ fn join(
         }
         between.push(None);
         // Where files are not accurate, sides may cross before their ends.
-        if gap > 1e-9 * tolerances.diagonal && k != after {
+        if tolerances.cuts_sides && gap > 1e-9 * tolerances.diagonal && k != after {
             let mut one = std::mem::take(&mut sides[k]);
             let is_cut = cut(&mut one, &mut sides[after], point, most);
             sides[k] = one;

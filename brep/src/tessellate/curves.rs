@@ -11,6 +11,9 @@ const FEWEST: usize = 2;
 /// diagonal).
 const BENT: f64 = 1e-6;
 
+/// Vertices on a curve are so many times as far from its corner as its end is.
+const FAR: f64 = 4.0;
+
 /// Where a curve goes back for at most this share of its length, and of the diagonal, that is a
 /// hook and no shape: edges of chamfers and offsets have them at bends sharper than they are wide.
 const HOOK: [f64; 2] = [5e-3, 1e-3];
@@ -90,6 +93,24 @@ pub(super) fn divide(
     // Files bend the ends of curves to their vertices, which may make hooks.
     out.retain(|&t| is_closed || t == low || t == high || !(is_near(low, t) || is_near(t, high)));
     Ok(without_hooks(edge, out, diagonal))
+}
+
+/// The parameters without those beside corners that are off the ends of a curve: from there it would
+/// turn sharply to the corner.
+pub(super) fn away_from_ends(
+    edge: &EdgeCurve,
+    ends: [Point; 2],
+    mut at: Vec<f64>,
+    diagonal: f64,
+) -> Vec<f64> {
+    for (corner, t) in ends.into_iter().zip(edge.range) {
+        let away = |t: f64| (edge.curve.point(t) - corner.coords).norm();
+        let gap = away(t);
+        if gap > BENT * diagonal {
+            at.retain(|&t| edge.range.contains(&t) || away(t) >= FAR * gap);
+        }
+    }
+    at
 }
 
 /// The parameters without those on hooks of a curve, where it turns back and soon once more.
@@ -198,6 +219,18 @@ mod tests {
         let poles = points.iter().map(|&[x, y]| Vector::new(x, y, 0.0)).collect();
         let curve = Curve::Spline(SplineCurve { basis, poles, weights: Vec::new() });
         EdgeCurve { curve, range: [0.0, 1.0], ends: [0, 1], tolerance: 1e-9 }
+    }
+
+    #[test]
+    fn no_vertices_are_beside_corners_off_the_ends_of_a_curve() {
+        let edge = polyline(&[[0.0, 0.0], [0.03, 0.0], [0.05, 0.0], [1.0, 0.0], [1.97, 0.0], [2.0, 0.0]]);
+        let off = |gap: f64| {
+            let ends = [Point::new(0.0, gap, 0.0), Point::new(2.0, 0.0, 0.0)];
+            away_from_ends(&edge, ends, (0..=5).map(|k| f64::from(k) / 5.0).collect(), 2.0)
+        };
+        assert_eq!(off(0.01), [0.0, 0.4, 0.6, 0.8, 1.0]);
+        // So little is rounding.
+        assert_eq!(off(1e-6).len(), 6);
     }
 
     #[test]

@@ -19,6 +19,8 @@ pub(super) struct Tolerances {
     pub diagonal: f64,
     /// Whether patches with folded triangles fail, so that their curves are divided more finely.
     pub refuses_folds: bool,
+    /// Whether sides of a loop that cross beside their common corner end there.
+    pub cuts_sides: bool,
 }
 
 /// Why a patch has no triangles.

@@ -186,7 +186,7 @@ impl Tessellation {
         let mut curve_settings = of_curves(model, &settings);
         let (mut failed, mut most_points) = (None, 0);
         let mut last: Option<Self> = None;
-        let (mut crossed, mut alike) = (Vec::new(), BTreeSet::new());
+        let (mut crossed, mut alike, mut cut) = (Vec::new(), BTreeSet::new(), BTreeSet::new());
         for retry in 0..MOST_RETRIES {
             let mut out = Self::divided(model, &divided, &curve_settings, diagonal, &alike)?;
             out.settings.clone_from(&settings);
@@ -196,7 +196,14 @@ impl Tessellation {
                 break;
             }
             let known = last.as_ref().or(before).map(Known::new);
-            let conflicts = out.triangulate(model, diagonal, known.as_ref(), retry < UNFOLDING_RETRIES)?;
+            let tolerances = |patch: usize, Settings { chord, angle }: Settings| face::Tolerances {
+                chord: chord * diagonal,
+                angle,
+                diagonal,
+                refuses_folds: retry < UNFOLDING_RETRIES,
+                cuts_sides: cut.contains(&patch),
+            };
+            let conflicts = out.triangulate(model, known.as_ref(), tolerances)?;
             if conflicts.is_empty() {
                 let shells = orient::orient(model, &out)?;
                 measure::check(model, &out)?;
@@ -211,6 +218,7 @@ impl Tessellation {
                 }
                 if is_crossing {
                     crosses.push(patch);
+                    cut.insert(patch);
                 }
                 failed = Some(error);
             }
@@ -229,18 +237,12 @@ impl Tessellation {
     fn triangulate(
         &mut self,
         model: &Model,
-        diagonal: f64,
         known: Option<&Known>,
-        refuses_folds: bool,
+        tolerances: impl Fn(usize, Settings) -> face::Tolerances + Sync,
     ) -> Result<Vec<Conflict>, BrepError> {
         let of_patch = |patch| match known.and_then(|known| known.made(model, patch, self)) {
             Some(made) => Ok(made),
-            None => {
-                let Settings { chord, angle } = self.settings[patch];
-                let chord = chord * diagonal;
-                let tolerances = face::Tolerances { chord, angle, diagonal, refuses_folds };
-                face::triangulate(model, patch, self, &tolerances)
-            }
+            None => face::triangulate(model, patch, self, &tolerances(patch, self.settings[patch])),
         };
         let made: Vec<_> = (0..model.patches.len()).into_par_iter().map(of_patch).collect();
         let mut conflicts = Vec::new();
@@ -278,7 +280,9 @@ impl Tessellation {
             let (curve, Settings { chord, angle }) = (&model.curves[number], settings[number]);
             let beside: Vec<curves::Beside> =
                 beside[number].iter().map(|&(patch, fin)| (&model.patches[patch].surface, fin)).collect();
+            let ends = curve.ends.map(|end| model.corners[end].point);
             curves::divide(curve, &beside, (chord * diagonal, angle), diagonal)
+                .map(|parameters| curves::away_from_ends(curve, ends, parameters, diagonal))
                 .map_err(|what| BrepError::edge(number, what, Some(model.corners[curve.ends[0]].point)))
         };
         let divided: Vec<_> = (0..model.curves.len()).into_par_iter().map(divided).collect();
