@@ -266,14 +266,23 @@ impl BrepProjector {
 
     fn foot_on_edge(&self, number: u32, point: &Point) -> brep::CurveFoot {
         let edge = &self.source.edges[number as usize];
-        let mut range = [edge.line[0].1, edge.line[edge.line.len() - 1].1];
-        if let (Some(period), true) =
-            (edge.curve.period(), edge.line[0].0 == edge.line[edge.line.len() - 1].0)
-        {
+        let [first, last] = [edge.line[0], edge.line[edge.line.len() - 1]];
+        let range = [first.1, last.1];
+        let start = self.start_on_edge(number, point);
+        if let (Some(period), true) = (edge.curve.period(), first.0 == last.0) {
             // A whole period: its end is no end.
-            range = [range[0] - period, range[1] + period];
+            return project_to_curve(&edge.curve, [range[0] - period, range[1] + period], point, start);
         }
-        project_to_curve(&edge.curve, range, point, self.start_on_edge(number, point))
+        let mut foot = project_to_curve(&edge.curve, range, point, start);
+        let points = &self.edges[number as usize].points;
+        for (end, corner) in range.into_iter().zip([points[0], points[points.len() - 1]]) {
+            if foot.parameter == end {
+                // Where the corner is off the end of the curve, the edge goes straight on to it.
+                let on_curve = foot.point;
+                foot.point = on_curve + (corner - on_curve) * in_segment(point, &on_curve, &corner).0;
+            }
+        }
+        foot
     }
 
     /// The nearest foot on edges; `None` if there are none.
@@ -396,4 +405,31 @@ fn sag(model: &brep::Model, tessellation: &Tessellation, number: usize, face: &F
         face.triangles.iter().map(of_triangle).fold(0.0, f64::max)
     };
     edges.map(of_edge).fold(on_triangles, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use brep::{Model, Settings, Unit};
+
+    #[test]
+    fn an_edge_goes_straight_on_to_a_corner_off_its_end() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/geometries/step/tiny_chamfer.step");
+        let mut model = Model::read_step(&std::fs::read(path).unwrap(), Unit::OfFile).unwrap();
+        let edge = 0;
+        let [point, tangent, ..] = model.curves[edge].curve.jet(model.curves[edge].range[1]);
+        let (end, away) = (Point::from(point), tangent.normalize() * 3e-5);
+        model.corners[model.curves[edge].ends[1]].point = end + away;
+        let tessellation = Tessellation::of(&mut model, &Settings::default()).unwrap();
+        let patches: Vec<Vec<usize>> = (0..model.patches.len()).map(|face| vec![face]).collect();
+        let curves: Vec<Vec<(usize, bool)>> =
+            (0..model.curves.len()).map(|edge| vec![(edge, true)]).collect();
+        let (is_reversed, is_short) = (vec![false; patches.len()], vec![false; curves.len()]);
+        let projector = BrepProjector::new(&model, &tessellation, &is_reversed, &patches, &curves, &is_short);
+        for share in [0.25, 0.75, 1.0] {
+            let place = end + away * share;
+            let found = projector.project_curve(CurveId(edge as u32), &place).unwrap();
+            assert!((found - place).norm() <= 1e-12, "{share}: {found}");
+        }
+    }
 }
