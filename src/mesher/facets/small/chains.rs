@@ -59,10 +59,16 @@ pub(super) fn chains(layout: &Layout, patch_of: &[usize], is_short: &[bool]) -> 
             chains.push(Some(Chain { edges: vec![(edge, true)], ends }));
         }
     }
+    let mut at: Vec<Vec<usize>> = vec![Vec::new(); layout.is_corner.len()];
+    for (number, chain) in chains.iter().flatten().enumerate() {
+        let mut ends = chain.ends.map(Vec::from).unwrap_or_default();
+        ends.dedup();
+        ends.into_iter().for_each(|end| at[end].push(number));
+    }
     loop {
         let mut changed = false;
         for corner in (0..may_drop.len()).filter(|&corner| may_drop[corner]) {
-            changed |= drop_corner(layout, corner, &mut chains, is_short, &patches);
+            changed |= drop_corner(layout, corner, &mut chains, &mut at, is_short, &patches);
         }
         if !changed {
             return chains.into_iter().flatten().collect();
@@ -70,24 +76,24 @@ pub(super) fn chains(layout: &Layout, patch_of: &[usize], is_short: &[bool]) -> 
     }
 }
 
-/// Joins the two chains at a corner, if there are two that may be joined.
+/// Joins the two chains at a corner, if there are two that may be joined; `at` has the numbers of
+/// the chains at each corner.
 fn drop_corner(
     layout: &Layout,
     corner: usize,
     chains: &mut [Option<Chain>],
+    at: &mut [Vec<usize>],
     is_short: &[bool],
     patches: &impl Fn(usize) -> Vec<usize>,
 ) -> bool {
-    let mut at: Vec<(usize, bool)> = Vec::new();
-    for (number, chain) in chains.iter().enumerate() {
-        let ends = chain.as_ref().and_then(|chain| chain.ends);
-        for (k, end) in ends.into_iter().flatten().enumerate() {
-            if end == corner {
-                at.push((number, k == 1));
-            }
+    let mut ends: Vec<(usize, bool)> = Vec::new();
+    for &number in &at[corner] {
+        let of_chain = chains[number].as_ref().and_then(|chain| chain.ends);
+        for (k, _) in of_chain.into_iter().flatten().enumerate().filter(|(_, end)| *end == corner) {
+            ends.push((number, k == 1));
         }
     }
-    let &[(one, one_ends), (other, other_ends)] = &at[..] else { return false };
+    let &[(one, one_ends), (other, other_ends)] = &ends[..] else { return false };
     let oriented = |number: usize, is_reversed: bool| {
         let mut chain = chains[number].clone().expect("a chain in use");
         if is_reversed {
@@ -115,7 +121,12 @@ fn drop_corner(
     joined.reverse();
     joined.edges.extend(&second.edges);
     joined.ends = joined.ends.zip(second.ends).map(|(a, b)| [a[0], b[1]]);
-    chains[one.min(other)] = Some(joined);
-    chains[one.max(other)] = None;
+    let (kept, dropped) = (one.min(other), one.max(other));
+    for end in joined.ends.into_iter().flatten() {
+        at[end].retain(|&number| ![kept, dropped].contains(&number));
+        at[end].push(kept);
+        at[end].sort_unstable();
+    }
+    (chains[kept], chains[dropped]) = (Some(joined), None);
     true
 }

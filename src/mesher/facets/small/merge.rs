@@ -19,6 +19,10 @@ const ROUNDS: usize = 12;
 /// face is narrow beside them.
 const MERGES: usize = 3;
 
+/// After so many failures to merge more tips than before, all that are new are cut off where they
+/// are narrower, or left.
+const FAILURES: usize = 2;
+
 /// Merges the small faces and edges of a model, and narrow tips of faces; `None` if there are none.
 ///
 /// Narrow faces along several faces are divided first, unless not all of their pieces are merged.
@@ -110,7 +114,7 @@ fn with_tips(
     while !ends.is_empty() && !small.work.is_cancelled() {
         layout.blunt = ends.iter().map(|(_, end)| *end).collect();
         let (outcome, tips) =
-            merge_tips(&layout, shape, small, candidates.clone(), merge_all(shape, &layout, small));
+            merge_tips(&layout, shape, small, &mut candidates, merge_all(shape, &layout, small));
         let count = ends.len();
         ends.retain(|(candidate, _)| tips.iter().any(|tip| tip.candidate == *candidate));
         if ends.len() == count {
@@ -118,7 +122,7 @@ fn with_tips(
         }
     }
     layout.blunt.clear();
-    let (outcome, _) = merge_tips(&layout, shape, small, candidates, without_tips);
+    let (outcome, _) = merge_tips(&layout, shape, small, &mut candidates, without_tips);
     outcome.finished(model, tessellation, shape)
 }
 
@@ -127,12 +131,13 @@ fn with_tips(
 ///
 /// Tips are cut off as faces of their own where they are narrow beside the sizes of the model
 /// without them. Those that are not merged then are cut off where they are narrower, or left; those
-/// that are merged are cut off again where they are narrow beside the sizes that this gives.
+/// that are merged are cut off again where they are narrow beside the sizes that this gives. What
+/// candidates have failed with is tried no more.
 fn merge_tips(
     layout: &Layout,
     shape: &Shape,
     small: &Small,
-    mut candidates: Vec<Candidate>,
+    candidates: &mut [Candidate],
     mut outcome: Outcome,
 ) -> (Outcome, Vec<NarrowTip>) {
     let Layout { model, tessellation, .. } = *layout;
@@ -143,20 +148,27 @@ fn merge_tips(
     let of_file =
         || (small.size)(&grouped(model, tessellation, shape, &shape.ungrouped(model), &layout.blunt));
     let mut size = outcome.size.take().unwrap_or_else(of_file);
-    let mut merges = 0;
+    let (mut merges, mut failures) = (0, 0);
     for _ in 0..ROUNDS {
-        let tips = narrow(layout, &candidates, &*size, small.tip_factors, &done);
+        let tips = narrow(layout, candidates, &*size, small.tip_factors, &done);
         if tips == done || merges == MERGES || small.work.is_cancelled() {
             break;
         }
         let Some(cut) = cut_off(model, &tips) else { break };
         match merge_cut(layout, small, cut, &tips) {
             Ok(merged) => {
-                (outcome, done, merges) = (merged, tips, merges + 1);
+                (outcome, done, merges, failures) = (merged, tips, merges + 1, 0);
                 let Some(of_merged) = outcome.size.take() else { break };
                 size = of_merged;
             }
-            Err(failed) => failed.into_iter().for_each(|candidate| candidates[candidate].attempt += 1),
+            Err(mut failed) => {
+                failures += 1;
+                if merges > 0 && failures > FAILURES {
+                    // What fails is one tip after the other.
+                    failed = tips.iter().filter(|tip| !done.contains(tip)).map(|tip| tip.candidate).collect();
+                }
+                failed.into_iter().for_each(|candidate| candidates[candidate].attempt += 1);
+            }
         }
     }
     (outcome, done)
