@@ -8,7 +8,7 @@ use crate::ground::progress::Cancelled;
 use crate::ground::size::{SizeField, Source};
 use crate::mesher::surface::SurfaceError;
 use crate::mesher::surface::curves::CurveError;
-use crate::mesher::volume::{SurfaceFaults, VolumeError};
+use crate::mesher::volume::{SurfaceFault, SurfaceFaults, VolumeError};
 use csg::features::{Named, Pair, Place};
 
 /// Factor applied to the size where an attempt failed.
@@ -172,6 +172,15 @@ impl CoarseError {
                 long.iter().map(shorter).collect()
             }
             _ => self.places().iter().map(|&point| smaller_at(point, size)).collect(),
+        }
+    }
+
+    /// Places where there is no mesh, all that are known.
+    pub(super) fn all_places(&self) -> Vec<Point> {
+        match self {
+            Self::NotClosed { faults, .. } => faults.0.iter().filter_map(SurfaceFault::place).collect(),
+            Self::Surface(SurfaceError::TooCoarse { places, .. }) => places.clone(),
+            _ => self.places().to_vec(),
         }
     }
 

@@ -12,7 +12,11 @@ use super::settings::{GenerateSettings, Wanted};
 use crate::ground::comm::Communicator;
 use crate::ground::error::{ErrorKind, HasKind};
 use crate::ground::progress::{Progress, Stage};
-use crate::mesher::facets::MergedSmall;
+use crate::mesher::facets::{Kept, MergedSmall};
+
+/// A geometry is merged so often, at most: each time without the small faces and edges beside which
+/// there was no mesh before.
+const TRIALS: usize = 4;
 
 /// **Collective.** Makes the mesh; only rank 0 needs the geometry and reports `progress`.
 ///
@@ -32,38 +36,59 @@ pub fn generate(
     options::refuse_different(comm, geometry.is_some(), settings)?;
     comm.agree(options::refuse_impossible(settings))?;
     let model = geometry.filter(|_| comm.rank() == 0).map(|geometry| &geometry.model);
-    let (merged, report) = match model {
-        Some(Model::Facets(solid)) if solid.may_be_merged() => merge_small(solid, settings, progress),
-        _ => (None, MergedSmall::default()),
-    };
-    let (mut made, is_merged) = of_merged(comm, merged.as_ref(), model, settings, progress)?;
-    if let Some(coarse) = made.coarse.as_mut().filter(|_| is_merged) {
-        coarse.report.merged_small = report;
+    let mut kept = Kept::default();
+    let mut trials = 0;
+    loop {
+        trials += 1;
+        let (merged, report) = match model {
+            Some(Model::Facets(solid)) if solid.may_be_merged() => {
+                merge_small(solid, settings, &kept, progress)
+            }
+            _ => (None, MergedSmall::default()),
+        };
+        let keep = |error: &Error| match (model, error) {
+            (Some(Model::Facets(solid)), Error::Coarse(error)) if trials < TRIALS => {
+                solid.keep_beside(&error.all_places(), &report, &mut kept)
+            }
+            _ => false,
+        };
+        let made = of_merged(comm, merged.as_ref(), model, settings, progress, keep)?;
+        if let Some((mut made, is_merged)) = made {
+            if let Some(coarse) = made.coarse.as_mut().filter(|_| is_merged) {
+                coarse.report.merged_small = report;
+            }
+            return Ok(made);
+        }
     }
-    Ok(made)
 }
 
 /// **Collective.** Generates the mesh of rank 0's merged model, or if that has no mesh, or there is
-/// none, of its own one; on rank 0 also returns whether it was the merged one.
+/// none, of its own one; on rank 0 also returns whether it was the merged one. `None` if more is
+/// kept after an error, so that the model should be merged again; only rank 0 is asked that.
 fn of_merged(
     comm: &dyn Communicator,
     merged: Option<&Model>,
     model: Option<&Model>,
     settings: &GenerateSettings,
     progress: &Progress,
-) -> Result<(Generated, bool), Error> {
+    mut keep: impl FnMut(&Error) -> bool,
+) -> Result<Option<(Generated, bool)>, Error> {
     match generate_of(comm, merged.or(model), settings, progress) {
-        Ok(made) => Ok((made, merged.is_some())),
+        Ok(made) => Ok(Some((made, merged.is_some()))),
         Err(error) => {
-            let mut may_help = vec![u8::from(merged.is_some() && may_come_from_merging(&error))];
-            let is_heard = comm.broadcast(0, &mut may_help).is_ok();
-            if !is_heard || may_help != [1] {
+            let may_help = merged.is_some() && may_come_from_merging(&error);
+            let mut next = vec![u8::from(may_help), u8::from(may_help && keep(&error))];
+            let is_heard = comm.broadcast(0, &mut next).is_ok();
+            if !is_heard || next[0] == 0 {
                 return Err(error);
             }
-            progress.note(&format!(
-                "small faces and edges are kept, because there is no mesh with them merged: {error}"
-            ));
-            Ok((generate_of(comm, model, settings, progress)?, false))
+            let is_again = next[1] == 1;
+            let which = if is_again { "some small faces and edges" } else { "small faces and edges" };
+            progress.note(&format!("{which} are kept, because there is no mesh with them merged: {error}"));
+            match is_again {
+                true => Ok(None),
+                false => Ok(Some((generate_of(comm, model, settings, progress)?, false))),
+            }
         }
     }
 }
@@ -79,6 +104,7 @@ fn may_come_from_merging(error: &Error) -> bool {
 fn merge_small(
     solid: &FacetSolid,
     settings: &GenerateSettings,
+    kept: &Kept,
     progress: &Progress,
 ) -> (Option<Model>, MergedSmall) {
     /// The volume of a regular tet with edges of length 1.
@@ -93,8 +119,8 @@ fn merge_small(
     };
     // Nodes of second order divide edges, too.
     let pieces = pieces * settings.coarse.order.degree();
-    let (merged, report) =
-        progress.stage(Stage::Merge, |work| solid.merge_small(&settings.coarse.size, largest, pieces, work));
+    let (merged, report) = progress
+        .stage(Stage::Merge, |work| solid.merge_small(&settings.coarse.size, largest, pieces, kept, work));
     report.notes().iter().for_each(|text| progress.note(text));
     (merged.map(|solid| Model::Facets(Box::new(solid))), report)
 }
@@ -138,16 +164,27 @@ mod tests {
                 let is_first = comm.rank() == 0;
                 let models = [merged, Some(model)].map(|model| model.filter(|_| is_first));
                 let settings = GenerateSettings::default();
-                of_merged(comm, models[0], models[1], &settings, &Progress::new(&Silent))
-                    .map(|(made, is_merged)| (made.check.tets, is_merged))
+                of_merged(comm, models[0], models[1], &settings, &Progress::new(&Silent), |_| false)
+                    .map(|made| made.map(|(made, is_merged)| (made.check.tets, is_merged)))
                     .map_err(|error| error.to_string())
             })
             .unwrap()
         };
+        let again = thread::run(2, |comm| {
+            let is_first = comm.rank() == 0;
+            let models = [&crossed, &sound].map(|model| Some(model).filter(|_| is_first));
+            let settings = GenerateSettings::default();
+            // Only the first rank knows what to keep.
+            let keep = |error: &Error| is_first && matches!(error, Error::Coarse(_));
+            of_merged(comm, models[0], models[1], &settings, &Progress::new(&Silent), keep)
+                .map(|made| made.is_none())
+                .map_err(|error| error.to_string())
+        });
+        assert_eq!(again.unwrap(), [Ok(true), Ok(true)]);
         let expected = run(None, &sound);
         assert!(expected.iter().all(Result::is_ok), "{expected:?}");
         assert_eq!(run(Some(&crossed), &sound), expected);
         assert!(run(Some(&crossed), &crossed).iter().all(Result::is_err));
-        assert!(run(Some(&sound), &crossed)[0].as_ref().is_ok_and(|made| made.1));
+        assert!(run(Some(&sound), &crossed)[0].as_ref().is_ok_and(|made| made.is_some_and(|made| made.1)));
     }
 }

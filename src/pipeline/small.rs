@@ -5,7 +5,7 @@ use crate::Point;
 use crate::ground::mesh::Names;
 use crate::ground::progress::Work;
 use crate::ground::size::{Evaluation, SizeField, SizeSettings};
-use crate::mesher::facets::{FacetModel, FacetSize, MergedSmall, Small, largest_size, merge};
+use crate::mesher::facets::{FacetModel, FacetSize, Kept, MergedSmall, Small, largest_size, merge};
 
 /// Faces and edges are small if the elements are at least this many times as large. Merging moves
 /// the boundary of a patch by the width of the face: less than the surface error of curved parts.
@@ -41,13 +41,14 @@ impl FacetSolid {
     }
 
     /// Merges edges and faces of a CAD file that are small beside the elements into their
-    /// neighbours; `None` for the solid if there are none. Elements are as large as the sizes, but
+    /// neighbours, but for those that are `kept`; `None` for the solid if there are none. Elements are as large as the sizes, but
     /// at most `largest`, and are divided into `pieces` along each edge.
     pub(super) fn merge_small(
         &self,
         settings: &SizeSettings,
         largest: f64,
         pieces: u32,
+        kept: &Kept,
         work: &Work,
     ) -> (Option<Self>, MergedSmall) {
         let Some(cad) = &self.cad else { return (None, MergedSmall::default()) };
@@ -59,7 +60,7 @@ impl FacetSolid {
             Box::new(AtMost(FacetSize::evaluated(model, settings, Evaluation::Searched), largest))
         };
         let touching = &self.model.touching;
-        let small = Small { factor, still_factor, largest, tip_factors, touching, size: &size, work };
+        let small = Small { factor, still_factor, largest, tip_factors, kept, touching, size: &size, work };
         let (merged, report) = merge(&cad.model, &cad.tessellation, &small);
         let solid = merged.map(|(model, exact, grouping)| {
             let label = |faces: &Vec<usize>| self.names.patches[faces[0]].clone();
@@ -68,5 +69,10 @@ impl FacetSolid {
             Self { model, exact: Some(exact), names, ..self.clone() }
         });
         (solid, report)
+    }
+
+    /// Adds what was merged beside some places to what is kept; returns whether there is any.
+    pub(super) fn keep_beside(&self, places: &[Point], merged: &MergedSmall, kept: &mut Kept) -> bool {
+        self.cad.as_ref().is_some_and(|cad| kept.add_beside(merged, &cad.tessellation, places))
     }
 }

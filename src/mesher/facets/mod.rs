@@ -56,6 +56,6 @@ pub use remesh::deviation;
 pub use remesh::{RemeshReport, RemeshSettings, remesh};
 pub use sharp_places::{SharpPlace, SharpPlaces};
 pub use size::{FacetSize, largest_size};
-pub use small::{Grouping, MergedEdge, MergedFace, MergedSmall, MergedTip, NamedFace, Small, merge};
+pub use small::{Grouping, Kept, MergedEdge, MergedFace, MergedSmall, MergedTip, NamedFace, Small, merge};
 pub use smoothness::FacetSmoothness;
 pub use unfold::unfold;

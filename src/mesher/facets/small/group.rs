@@ -2,6 +2,7 @@
 
 use super::chains::{Chain, chains};
 use super::faces::{Joins, continued, joins};
+use super::kept::Kept;
 use super::layout::Layout;
 use super::report::{MergedEdge, MergedFace, MergedSmall, NamedFace};
 use crate::Point;
@@ -38,6 +39,8 @@ pub struct Small<'a> {
     /// Tips of faces are cut off where elements are this many times as large as their width: those
     /// with sharp edges, and those that go on smoothly beyond an edge.
     pub tip_factors: [f64; 2],
+    /// What is not merged.
+    pub kept: &'a Kept,
     /// The bodies that touch.
     pub touching: &'a Touching,
     /// The wanted size of elements of a model.
@@ -76,7 +79,9 @@ impl Allowed {
             !is_closed && layout.lengths[edge] <= most.min(neighbour / LONGER)
         };
         let mut edges = vec![false; layout.lengths.len()];
-        layout.curves.iter().for_each(|&edge| edges[edge] = is_short(edge));
+        for &edge in &layout.curves {
+            edges[edge] = is_short(edge) && !small.kept.edges.contains(&edge);
+        }
         // A face that hardly turns may be as wide as a tip that does not.
         let is_bend = |face: usize| {
             small.tip_factors[1] * layout.widths[face] <= small.largest
@@ -86,7 +91,7 @@ impl Allowed {
         loop {
             // The corner between rounded edges has only narrow faces beside it.
             let before = faces.clone();
-            for face in (0..faces.len()).filter(|&face| !before[face]) {
+            for face in (0..faces.len()).filter(|face| !before[*face] && !small.kept.faces.contains(face)) {
                 faces[face] = LONGER * layout.widths[face] <= widest_near(layout, face, &before)
                     && (layout.widths[face] <= most || is_bend(face));
             }

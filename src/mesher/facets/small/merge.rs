@@ -32,6 +32,7 @@ pub fn merge(model: &Model, tessellation: &Tessellation, small: &Small) -> (Opti
     let allowed = Allowed::of(&layout, small);
     let mut divisions = divisions(&layout, &allowed.faces);
     divisions.extend(spurs(&layout, &allowed, &divisions));
+    divisions.retain(|division| !small.kept.faces.contains(&division.face));
     while !divisions.is_empty() && !small.work.is_cancelled() {
         match merge_divided(model, tessellation, small, &divisions) {
             Ok(merged) => return merged,
@@ -101,7 +102,8 @@ fn with_tips(
     let Layout { model, tessellation, .. } = layout;
     let mut candidates = candidates(&layout);
     let is_merged = |face: usize| without_tips.report.faces.iter().any(|merged| merged.face == face + 1);
-    candidates.retain(|candidate| !is_merged(candidate.face()));
+    let is_kept = |face: usize| small.kept.faces.contains(&face);
+    candidates.retain(|candidate| !is_merged(candidate.face()) && !is_kept(candidate.face()));
     if candidates.is_empty() {
         return without_tips.finished(model, tessellation, shape);
     }

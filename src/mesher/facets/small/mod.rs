@@ -21,6 +21,8 @@
 //! Curves inside a composite patch are dropped. Then corners with two curves left are dropped if
 //! one of the curves is short, or if they do not bend there.
 //!
+//! What has no mesh without some faces or edges is merged again, all but these (`kept`).
+//!
 //! *Not* merged are short edges between corners at which three or more curves remain: the corner
 //! that would be left is off the faces that it had not touched.
 
@@ -28,6 +30,7 @@ mod blunt;
 mod chains;
 mod faces;
 mod group;
+mod kept;
 mod layout;
 mod merge;
 mod report;
@@ -38,6 +41,7 @@ mod tests;
 mod tips;
 
 pub use group::{Grouping, Small};
+pub use kept::Kept;
 pub(super) use layout::Layout;
 pub use merge::merge;
 pub use report::{MergedEdge, MergedFace, MergedSmall, MergedTip, NamedFace};

@@ -1,4 +1,5 @@
-use super::{MergedSmall, Small, merge};
+use super::{Kept, MergedSmall, Small, merge};
+use crate::Point;
 use crate::ground::mesh::Touching;
 use crate::ground::progress::Work;
 use crate::ground::size::{SizeField, UniformSize};
@@ -17,14 +18,25 @@ fn merged_of(model: Model, size: f64) -> (Option<FacetModel>, MergedSmall) {
 }
 
 /// Merges what is small beside elements of a size that depends on the model.
-fn merged_with(mut model: Model, size: &dyn Fn(&FacetModel) -> f64) -> (Option<FacetModel>, MergedSmall) {
+fn merged_with(model: Model, size: &dyn Fn(&FacetModel) -> f64) -> (Option<FacetModel>, MergedSmall) {
+    merged_but(model, size, |_, _| Kept::default())
+}
+
+/// The same, but for what is kept.
+fn merged_but(
+    mut model: Model,
+    size: &dyn Fn(&FacetModel) -> f64,
+    kept: impl FnOnce(&Model, &Tessellation) -> Kept,
+) -> (Option<FacetModel>, MergedSmall) {
     let tessellation = Tessellation::of(&mut model, &Settings::default()).unwrap();
+    let kept = &kept(&model, &tessellation);
     let size = |model: &FacetModel| -> Box<dyn SizeField> { Box::new(UniformSize(size(model))) };
     let small = Small {
         factor: 20.0,
         still_factor: 5.0,
         largest: f64::INFINITY,
         tip_factors: [10.0, 4.0],
+        kept,
         touching: &Touching::default(),
         size: &size,
         work: Work::unwatched(),
@@ -59,6 +71,28 @@ fn a_short_part_of_an_edge_is_joined_with_the_rest() {
     let [edge] = &report.edges[..] else { panic!("{report:?}") };
     assert!((edge.length - 1e-3).abs() < 1e-9 && edge.curve.len() == 3, "{edge:?}");
     assert!(report.faces.is_empty());
+}
+
+#[test]
+fn what_is_beside_a_place_without_a_mesh_is_kept() {
+    // In the middle of the chamfer, and away from it.
+    let (_, report) = merged("tiny_chamfer", 0.1);
+    let face = report.faces[0].face - 1;
+    let merged_beside = |away: f64| {
+        let mut is_kept = false;
+        let (_, report) = merged_but(read("tiny_chamfer"), &|_| 0.1, |_, tessellation| {
+            let of_face = tessellation.triangles.iter().find(|t| t.patch as usize == face).unwrap();
+            let [a, b, c] = of_face.vertices.map(|v| tessellation.points[v as usize].coords);
+            let place = Point::from((a + b + c) / 3.0 + away * crate::Vector::new(1.0, 1.0, 1.0));
+            let mut kept = Kept::default();
+            is_kept = kept.add_beside(&report, tessellation, &[place]);
+            assert_eq!(kept.faces.contains(&face), is_kept);
+            kept
+        });
+        (is_kept, report.faces.len())
+    };
+    assert_eq!(merged_beside(1e-3), (true, 0));
+    assert_eq!(merged_beside(10.0), (false, 1));
 }
 
 #[test]
