@@ -41,8 +41,9 @@ impl FacetSolid {
     }
 
     /// Merges edges and faces of a CAD file that are small beside the elements into their
-    /// neighbours, but for those that are `kept`; `None` for the solid if there are none. Elements are as large as the sizes, but
-    /// at most `largest`, and are divided into `pieces` along each edge.
+    /// neighbours, but for those that are `kept`; `None` for the solid if there are none. Elements
+    /// are as large as the sizes, but at most `largest`, and are divided into `pieces` along each
+    /// edge.
     pub(super) fn merge_small(
         &self,
         settings: &SizeSettings,

@@ -192,8 +192,8 @@ impl Chart<'_> {
             let middle = self.surface.point([0, 1].map(|i| 0.5 * (at[i] + found[i])));
             let bend = (middle - point(edge, 0.5 * (t + next))).norm();
             let little = OFF * chord + ROUNDING * self.diagonal;
-            // Beyond their knots splines continue, and a long step may end at a foot there. After a short
-            // one the foot is beside the one before, and further off only as the edge is.
+            // Beyond their knots splines continue, and a long step may end at a foot there. After a
+            // short one the foot is beside the one before, and further off only as the edge is.
             let is_near = || step < LONG_STEP || off <= gap + little || off <= 2.0 * self.distance(&place);
             let is_good = bend <= off.max(gap) + little && is_near();
             if is_good || step < SMALLEST_STEP {

@@ -27,11 +27,11 @@ pub(super) fn cut(one: &mut Chain, next: &mut Chain, point: impl Fn(Parameters) 
     let between =
         |from: Parameters, to: Parameters, share: f64| [0, 1].map(|k| from[k] + share * (to[k] - from[k]));
     let (last, before, after) = (one.len() - 1, one[i].0, next[j + 1].0);
-    for k in i + 1..=last {
-        one[k].0 = between(before, at, (k - i) as f64 / (last - i) as f64);
+    for (k, node) in one[i + 1..].iter_mut().enumerate() {
+        node.0 = between(before, at, (k + 1) as f64 / (last - i) as f64);
     }
-    for k in 0..=j {
-        next[k].0 = between(at, after, k as f64 / (j + 1) as f64);
+    for (k, node) in next[..=j].iter_mut().enumerate() {
+        node.0 = between(at, after, k as f64 / (j + 1) as f64);
     }
     true
 }

@@ -95,8 +95,8 @@ pub(super) fn divide(
     Ok(without_hooks(edge, out, diagonal))
 }
 
-/// The parameters without those beside corners that are off the ends of a curve: from there it would
-/// turn sharply to the corner.
+/// The parameters without those beside corners that are off the ends of a curve: from there it
+/// would turn sharply to the corner.
 pub(super) fn away_from_ends(
     edge: &EdgeCurve,
     ends: [Point; 2],
