@@ -96,21 +96,18 @@ pub(super) fn divide(
 }
 
 /// The parameters without those beside corners that are off the ends of a curve: from there it
-/// would turn sharply to the corner.
-pub(super) fn away_from_ends(
-    edge: &EdgeCurve,
-    ends: [Point; 2],
-    mut at: Vec<f64>,
-    diagonal: f64,
-) -> Vec<f64> {
+/// would turn sharply to the corner. All stay if none would between the ends: two curves may have
+/// the same corners.
+pub(super) fn away_from_ends(edge: &EdgeCurve, ends: [Point; 2], at: Vec<f64>, diagonal: f64) -> Vec<f64> {
+    let mut far = at.clone();
     for (corner, t) in ends.into_iter().zip(edge.range) {
         let away = |t: f64| (edge.curve.point(t) - corner.coords).norm();
         let gap = away(t);
         if gap > BENT * diagonal {
-            at.retain(|&t| edge.range.contains(&t) || away(t) >= FAR * gap);
+            far.retain(|&t| edge.range.contains(&t) || away(t) >= FAR * gap);
         }
     }
-    at
+    if far.len() > 2 { far } else { at }
 }
 
 /// The parameters without those on hooks of a curve, where it turns back and soon once more.
@@ -229,8 +226,8 @@ mod tests {
             away_from_ends(&edge, ends, (0..=5).map(|k| f64::from(k) / 5.0).collect(), 2.0)
         };
         assert_eq!(off(0.01), [0.0, 0.4, 0.6, 0.8, 1.0]);
-        // So little is rounding.
-        assert_eq!(off(1e-6).len(), 6);
+        // So little is rounding, and so much leaves none.
+        assert_eq!([1e-6, 1.0].map(|gap| off(gap).len()), [6, 6]);
     }
 
     #[test]
