@@ -2,6 +2,7 @@
 //! accuracy of the file.
 
 use super::chain::Chain;
+use super::measure::from_segment;
 use crate::Point;
 
 /// At most so many segments of each side are tried.
@@ -18,7 +19,7 @@ pub(super) fn cut(one: &mut Chain, next: &mut Chain, point: impl Fn(Parameters) 
         [&one[i + 1..], &next[..=j]].map(|nodes| nodes.iter().map(|node| point(node.0)).collect());
     beyond.iter_mut().zip([0, j + 1]).for_each(|(line, k)| line.insert(k, point(at)));
     let are_near = |one: &[Point], other: &[Point]| {
-        one.iter().all(|p| other.windows(2).any(|w| distance(p, [&w[0], &w[1]]) <= most))
+        one.iter().all(|p| other.windows(2).any(|w| from_segment(p, [w[0], w[1]]) <= most))
     };
     let [end, start] = &beyond;
     if !are_near(end, start) || !are_near(start, end) {
@@ -54,13 +55,6 @@ fn meet([a, b]: [Parameters; 2], [c, d]: [Parameters; 2]) -> Option<Parameters> 
     let shares = [cross(way, across) / both, cross(way, along) / both];
     let is_inside = shares.iter().all(|share| (0.0..=1.0).contains(share));
     is_inside.then(|| [0, 1].map(|k| a[k] + shares[0] * along[k]))
-}
-
-/// The distance of a point from a segment.
-fn distance(p: &Point, [a, b]: [&Point; 2]) -> f64 {
-    let way = b - a;
-    let share = (p - a).dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE);
-    (a + way * share.clamp(0.0, 1.0) - p).norm()
 }
 
 #[cfg(test)]

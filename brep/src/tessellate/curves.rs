@@ -1,5 +1,6 @@
 //! Division of curves.
 
+use super::measure::from_segment;
 use crate::{Corner, EdgeCurve, Fin, Point, Surface, Vector};
 
 /// The most vertices on a curve.
@@ -154,9 +155,8 @@ fn is_fine(
     let [first, last] = [a, b].map(|t| edge.curve.jet(t));
     let along = last[0] - first[0];
     let off = |share: f64| {
-        let way = edge.curve.point(a + share * (b - a)) - first[0];
-        let on = (way.dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        (way - along * on).norm()
+        let on = Point::from(edge.curve.point(a + share * (b - a)));
+        from_segment(&on, [first[0].into(), last[0].into()])
     };
     let middle = edge.curve.jet(0.5 * (a + b))[1];
     let turn = first[1].angle(&middle) + middle.angle(&last[1]);

@@ -4,6 +4,13 @@ use super::Tessellation;
 use crate::{BrepError, Model, Point};
 use std::collections::BTreeMap;
 
+/// The distance of a point from a segment.
+pub(super) fn from_segment(point: &Point, [a, b]: [Point; 2]) -> f64 {
+    let (along, to) = (b - a, point - a);
+    let share = (to.dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    (to - along * share).norm()
+}
+
 /// The area of a patch's triangles (length squared).
 pub fn area(tessellation: &Tessellation, patch: usize) -> f64 {
     let own = tessellation.triangles.iter().filter(|t| t.patch as usize == patch);

@@ -7,6 +7,7 @@
 use super::Tessellation;
 use super::face::{Corners, Face, Failure, INNER, Placed, is_finite, sorted};
 use super::frame::Node;
+use super::measure::from_segment;
 use crate::{BrepError, Vector};
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
@@ -334,10 +335,8 @@ impl Face<'_> {
     ) -> f64 {
         let [p, q] = [a, b].map(|n| self.point(n.vertex, out));
         let on = self.patch.surface.point(self.frame.parameters(middle(a, b)));
-        let along = q - p;
-        let share = ((on - p).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        let off = (on - p - along * share).norm() / self.tolerances.chord;
-        if off > 1.0 || along.norm() < SHORTEST * self.tolerances.diagonal {
+        let off = from_segment(&on, [p, q]) / self.tolerances.chord;
+        if off > 1.0 || (q - p).norm() < SHORTEST * self.tolerances.diagonal {
             return off;
         }
         let [m, n] = [*i, *j].map(|i| normals[i].unwrap_or_else(Vector::zeros));

@@ -51,6 +51,13 @@ impl Text {
         self.add(&format!("AXIS2_PLACEMENT_3D('',#{origin},#{z},#{x})"))
     }
 
+    /// A line from a point in a direction.
+    fn line(&mut self, start: u32, [x, y, z]: [f64; 3], length: f64) -> u32 {
+        let direction = self.add(&format!("DIRECTION('',({x:?},{y:?},{z:?}))"));
+        let vector = self.add(&format!("VECTOR('',#{direction},{length:?})"));
+        self.add(&format!("LINE('',#{start},#{vector})"))
+    }
+
     /// A bound of one edge.
     fn bound(&mut self, edge: u32, is_forward: bool) -> u32 {
         let flag = if is_forward { "T" } else { "F" };

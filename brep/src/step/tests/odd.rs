@@ -143,10 +143,8 @@ fn an_edge_into_a_plane_and_back_is_left_out() {
     let faces = cylinder(&mut text, true);
     let end = text.point(0.3, 0.0, 2.0);
     let end = text.add(&format!("VERTEX_POINT('',#{end})"));
-    let direction = text.add("DIRECTION('',(-1.,0.,0.))");
-    let vector = text.add(&format!("VECTOR('',#{direction},1.)"));
     let start = text.point(1.0, 0.0, 2.0);
-    let line = text.add(&format!("LINE('',#{start},#{vector})"));
+    let line = text.line(start, [-1.0, 0.0, 0.0], 1.0);
     // The vertex and the loop of the upper circle.
     let uses = |text: &Text, what: &str| -> u32 {
         let record = text.0.lines().filter(|line| line.contains(what)).nth(1).unwrap();
@@ -169,9 +167,7 @@ fn an_edge_and_a_face_without_length_are_left_out() {
     let faces = cylinder(&mut text, true);
     let point = text.point(1.0, 0.0, 2.0);
     let vertex = text.add(&format!("VERTEX_POINT('',#{point})"));
-    let direction = text.add("DIRECTION('',(0.,0.,0.))");
-    let vector = text.add(&format!("VECTOR('',#{direction},0.)"));
-    let line = text.add(&format!("LINE('',#{point},#{vector})"));
+    let line = text.line(point, [0.0; 3], 0.0);
     let edge = text.add(&format!("EDGE_CURVE('',#{vertex},#{vertex},#{line},.T.)"));
     let none = text.disk(edge, 2.0, true);
     let (model, volumes) = volumes(&text.solid(&[faces[0], faces[1], faces[2], none]), Unit::OfFile);
@@ -210,10 +206,7 @@ fn cube(text: &mut Text, origin: [f64; 3], vertices: &mut HashMap<[i32; 3], u32>
                 let way = [0, 1, 2].map(|i| places[(k + 1) % 4][i] - places[k][i]);
                 let edge = *edges.entry([a.min(b), a.max(b)]).or_insert_with(|| {
                     let start = text.point(places[k][0], places[k][1], places[k][2]);
-                    let direction =
-                        text.add(&format!("DIRECTION('',({:?},{:?},{:?}))", way[0], way[1], way[2]));
-                    let vector = text.add(&format!("VECTOR('',#{direction},1.)"));
-                    let line = text.add(&format!("LINE('',#{start},#{vector})"));
+                    let line = text.line(start, way, 1.0);
                     text.add(&format!("EDGE_CURVE('{a}',#{a},#{b},#{line},.T.)"))
                 });
                 let starts = format!("#{edge} = EDGE_CURVE('{a}'");
