@@ -23,7 +23,7 @@ pub(crate) fn build(file: &File) -> Result<Model, BrepError> {
     }
     let what = "edges have no curve in the parameters of a face: all are followed across their faces";
     model.notes.push(format!("{without_parameters} {what}"));
-    Shapes::of(&model).remake(&model)
+    Shapes::of(&model).remake(&model, &[])
 }
 
 /// A shape at a place: its index and the bits of its placement.
@@ -169,7 +169,7 @@ impl<'a> Builder<'a> {
         let mut shapes = Shapes::of(&self.model);
         self.model.from_faces = true;
         self.model.bodies = shapes.enclose(self.loose_edges, &mut self.model.notes)?.len();
-        shapes.remake(&self.model)
+        shapes.remake(&self.model, &[])
     }
 
     fn add_body(&mut self, solid: &Placed) -> Result<(), BrepError> {

@@ -16,7 +16,7 @@ impl Model {
         if !shapes.imprint() {
             return;
         }
-        let mut imprinted = match shapes.remake(self) {
+        let mut imprinted = match shapes.remake(self, &[]) {
             Ok(imprinted) => imprinted,
             Err(error) => {
                 self.notes.push(format!("solids touch, but cannot be imprinted on each other: {error}"));

@@ -2,7 +2,7 @@
 
 use crate::BrepError;
 use crate::model::Model;
-use crate::shapes::Shapes;
+use crate::shapes::{Cuts, Shapes};
 use crate::tessellate::{Settings, Tessellation, volume};
 
 /// How finely faces are triangulated to find where they cross.
@@ -34,7 +34,8 @@ impl std::str::FromStr for OverlapTo {
 
 impl Model {
     /// Leaves the common part of solids that overlap to one of them and cuts it out of the others,
-    /// with a note that names them. The cut face is an interface of both.
+    /// with a note that names them. The cut face is an interface of both. A solid that repeats
+    /// another one is left out, with a note.
     ///
     /// # Errors
     /// - Those of a tessellation,
@@ -58,11 +59,16 @@ impl Model {
         let mut rank = vec![0; self.bodies];
         order.into_iter().enumerate().for_each(|(place, body)| rank[body] = place);
         let mut shapes = Shapes::of(self);
-        let cut = shapes.cut_overlaps(&tessellation, &shells, &rank)?;
-        if cut.is_empty() {
+        let Cuts { pairs: cut, repeated } = shapes.cut_overlaps(&tessellation, &shells, &rank)?;
+        if cut.is_empty() && repeated.is_empty() {
             return Ok(());
         }
-        let mut model = shapes.remake(self)?;
+        let gone: Vec<usize> = repeated.iter().map(|pair| pair[0]).collect();
+        let mut model = shapes.remake(self, &gone)?;
+        for &[body, other] in &repeated {
+            let note = format!("{} repeats {}: left out", self.solid(body), self.solid(other));
+            model.notes.push(note);
+        }
         /// So many pairs are named.
         const NAMED: usize = 5;
         let pairs: Vec<String> = cut
@@ -71,7 +77,9 @@ impl Model {
             .map(|&[kept, cut]| format!("{} out of {}", self.solid(kept), self.solid(cut)))
             .collect();
         let more = if cut.len() > NAMED { format!(" and {} more", cut.len() - NAMED) } else { String::new() };
-        model.notes.push(format!("solids overlap: cut {}{more}", pairs.join(", ")));
+        if !pairs.is_empty() {
+            model.notes.push(format!("solids overlap: cut {}{more}", pairs.join(", ")));
+        }
         *self = model;
         Ok(())
     }

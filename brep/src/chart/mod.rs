@@ -123,6 +123,12 @@ impl<'a> Chart<'a> {
         self.surface.jet(u, v, 1).normal()
     }
 
+    /// The derivatives along both parameters.
+    pub fn derivatives(&self, [u, v]: Parameters) -> [Vector; 2] {
+        let d = self.surface.jet(u, v, 1).d;
+        [d[1][0], d[0][1]]
+    }
+
     /// Parameters moved by multiples of the periods to be nearest to others.
     pub fn unwrapped(&self, p: Parameters, near: Parameters) -> Parameters {
         [0, 1].map(|i| match self.periods[i] {
@@ -163,7 +169,7 @@ impl<'a> Chart<'a> {
     }
 
     /// The parameters of the nearest point near a guess.
-    fn near(&self, point: &Point, guess: Parameters) -> Parameters {
+    pub fn near(&self, point: &Point, guess: Parameters) -> Parameters {
         let Surface::Round { axes, profile, .. } = self.surface else {
             let found = project_to_surface(self.surface, point, guess);
             return self.within(point, guess, &found).unwrap_or(found.parameters);

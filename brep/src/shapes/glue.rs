@@ -157,7 +157,9 @@ pub(super) fn glue_patches(model: &mut Model, tolerance: f64) -> Vec<usize> {
         let own = patch.bodies.iter().flatten().next().copied();
         let same = known.iter().copied().find(|&other: &usize| {
             let is_free = kept[other].bodies.contains(&None) && !kept[other].bodies.contains(&own);
-            is_free && is_same_surface(model, &kept[other], &patch, tolerance)
+            is_free
+                && is_same_surface(model, &kept[other], &patch, tolerance)
+                && !are_on_one_side(model, [&kept[other], &patch])
         });
         match same {
             Some(other) => {
@@ -218,6 +220,19 @@ fn is_same_surface(model: &Model, one: &Patch, other: &Patch, tolerance: f64) ->
         let way = Vector2::from(foot.parameters) - start.point(t);
         is_near(&foot.point) && way.dot(&inward(start, fin)) > 0.0
     })
+}
+
+/// Whether the bodies of two patches with the same surface and edges are on the same side: these
+/// overlap.
+fn are_on_one_side(model: &Model, patches: [&Patch; 2]) -> bool {
+    let Some(curve) = patches[0].loops.iter().flatten().find_map(curve_of) else { return false };
+    let edge = &model.curves[curve];
+    let place = Point::from(edge.curve.point(middle(edge.range)));
+    let [a, b] = patches.map(|patch| {
+        let normal = nearest_on_surface(&patch.surface, &place).normal;
+        if patch.bodies[0].is_some() { normal } else { -normal }
+    });
+    a.dot(&b) > 0.0
 }
 
 /// A point of a patch beside the middle of a side.

@@ -11,6 +11,7 @@ mod tests;
 mod without_area;
 
 pub(crate) use enclose::left_out;
+pub(crate) use overlap::Cuts;
 
 use crate::chart::{Chart, Loop, Side, close};
 use crate::model::{AWAY, Corner, Fin, Model, On, Patch};
@@ -73,7 +74,7 @@ impl Shapes {
             faces: Vec::new(),
             body_of_corner,
             body_of_curve,
-            accuracy: vec![f64::INFINITY; model.bodies],
+            accuracy: vec![0.0; model.bodies],
             away: Vec::new(),
         };
         for (number, patch) in model.patches.iter().enumerate() {
@@ -88,8 +89,6 @@ impl Shapes {
                 let Some(body) = *body else { continue };
                 for &(curve, _) in loops.iter().flatten() {
                     shapes.body_of_curve[curve] = body;
-                    // Programs give worse edges larger tolerances.
-                    shapes.accuracy[body] = shapes.accuracy[body].min(model.curves[curve].tolerance);
                     shapes.curves[curve].ends.iter().for_each(|&end| shapes.body_of_corner[end] = body);
                 }
                 shapes.faces.push(Face {
@@ -103,10 +102,23 @@ impl Shapes {
                 });
             }
         }
-        for accuracy in shapes.accuracy.iter_mut().filter(|accuracy| accuracy.is_infinite()) {
+        shapes.take_accuracies();
+        shapes
+    }
+
+    /// Sets the accuracy of each body to the least tolerance of its edges: programs give worse edges
+    /// larger tolerances.
+    fn take_accuracies(&mut self) {
+        self.accuracy.fill(f64::INFINITY);
+        for face in &self.faces {
+            for (curve, _) in face.loops.iter().flatten() {
+                let accuracy = &mut self.accuracy[face.body];
+                *accuracy = accuracy.min(self.curves[*curve].tolerance);
+            }
+        }
+        for accuracy in self.accuracy.iter_mut().filter(|accuracy| accuracy.is_infinite()) {
             *accuracy = 0.0;
         }
-        shapes
     }
 
     /// Adds a corner of a body.
@@ -152,15 +164,24 @@ impl Shapes {
         diagonal(&self.corners, &self.curves, points)
     }
 
-    /// The model of shapes that were made of an old one.
+    /// The model of shapes that were made of an old one, without the bodies `gone`, which have no
+    /// faces.
     ///
     /// # Errors
     /// As for [`Self::build`].
-    pub fn remake(self, old: &Model) -> Result<Model, BrepError> {
+    pub fn remake(mut self, old: &Model, gone: &[usize]) -> Result<Model, BrepError> {
+        let left: Vec<usize> = (0..old.bodies).filter(|body| !gone.contains(body)).collect();
+        // What belongs to a body without faces is not used.
+        let number = |body: usize| left.binary_search(&body).unwrap_or(0);
+        let of_edges = [&mut self.body_of_corner, &mut self.body_of_curve].into_iter().flatten();
+        for body in of_edges.chain(self.faces.iter_mut().map(|face| &mut face.body)) {
+            *body = number(*body);
+        }
+        self.accuracy = left.iter().map(|&body| self.accuracy[body]).collect();
         let mut model = Model {
-            bodies: old.bodies,
+            bodies: left.len(),
             from_faces: old.from_faces,
-            body_names: old.body_names.clone(),
+            body_names: left.iter().filter_map(|&body| old.body_names.get(body)).cloned().collect(),
             metres: old.metres,
             notes: old.notes.clone(),
             ..Model::default()

@@ -31,7 +31,7 @@ impl Solids {
         self.0.curves.len() - 1
     }
 
-    fn line(&mut self, a: usize, b: usize) -> usize {
+    pub fn line(&mut self, a: usize, b: usize) -> usize {
         let [start, end] = [a, b].map(|corner| self.0.corners[corner].point.coords);
         self.edge(Curve::Line { start, direction: end - start }, [0.0, 1.0], [a, b])
     }
@@ -94,6 +94,15 @@ impl Solids {
         self.level(high, true, roof);
     }
 
+    /// A face with straight edges between places, and nothing else.
+    pub fn polygon(&mut self, surface: Surface, places: &[Vector]) {
+        self.body();
+        let corners: Vec<usize> = places.iter().map(|place| self.corner(*place)).collect();
+        let count = corners.len();
+        let edges = (0..count).map(|k| (self.line(corners[k], corners[(k + 1) % count]), true)).collect();
+        self.face(surface, vec![edges]);
+    }
+
     pub fn block(&mut self, low: [f64; 3], high: [f64; 3]) {
         let [a, b] = [low, high];
         let polygon = [[a[0], a[1]], [b[0], a[1]], [b[0], b[1]], [a[0], b[1]]].map(|[x, y]| X * x + Y * y);
@@ -124,6 +133,12 @@ impl Solids {
         self.body();
         let profile = Profile::Circle { major: 0.0, minor: radius };
         self.face(Surface::Round { origin: center, axes: [X, Y, Z], profile }, Vec::new());
+    }
+
+    /// States an accuracy for all solids.
+    pub fn set_accuracy(&mut self, accuracy: f64) {
+        self.0.accuracy.fill(accuracy);
+        self.0.curves.iter_mut().for_each(|edge| edge.tolerance = accuracy);
     }
 
     pub fn into_shapes(self) -> Shapes {

@@ -7,6 +7,7 @@
 
 mod contact;
 mod cross;
+mod order;
 mod regions;
 
 pub(super) use contact::{furthest, lies_on, whole};
@@ -75,13 +76,17 @@ fn divide_edges(shapes: &mut Shapes, pairs: &[Pair], size: f64) {
 pub(super) fn trim(shapes: &mut Shapes, crossed: &[[usize; 2]], size: f64) {
     let faces: BTreeSet<usize> = crossed.iter().flatten().copied().collect();
     faces.iter().for_each(|&face| drop_seams(shapes, face));
-    take_measured_gaps(shapes, &faces);
-    divide_edges(shapes, &faces.into_iter().map(Pair::Edges).collect::<Vec<_>>(), size);
+    divide_edges(shapes, &faces.iter().copied().map(Pair::Edges).collect::<Vec<_>>(), size);
+    let outline = |&face: &usize| Some((face, regions::outline(shapes, face, size)?));
+    let outlines: HashMap<usize, _> = faces.par_iter().filter_map(outline).collect();
     let common = |&[a, b]: &[usize; 2]| {
         let there: BTreeSet<usize> = shapes.faces[b].inner.iter().copied().collect();
         let common: Vec<usize> =
             shapes.faces[a].inner.iter().copied().filter(|c| there.contains(c)).collect();
-        let inside = [a, b].map(|face| regions::inside(shapes, face, &common, size));
+        let inside = [a, b].map(|face| match outlines.get(&face) {
+            Some(own) => regions::inside(shapes, face, own, &common, size),
+            None => BTreeSet::new(),
+        });
         let both: BTreeSet<usize> = inside[0].intersection(&inside[1]).copied().collect();
         (common, both)
     };
@@ -109,16 +114,12 @@ fn retain_different(shapes: &Shapes, contacts: &mut Vec<[usize; 2]>) {
     contacts.retain(|[a, b]| shapes.curves_of(*a) != shapes.curves_of(*b));
 }
 
-/// The distances of edges from the faces that they bound, for some faces and curves.
-fn gaps(
-    shapes: &Shapes,
-    faces: BTreeSet<usize>,
-    is_wanted: impl Fn(usize) -> bool + Sync,
-) -> Vec<(usize, f64)> {
+/// The distances of edges from the faces that they bound.
+fn gaps(shapes: &Shapes, faces: BTreeSet<usize>) -> Vec<(usize, f64)> {
     let of = |face: usize| {
         let surface = &shapes.faces[face].surface;
-        let own = shapes.curves_of(face).into_iter().filter(|&curve| is_wanted(curve));
-        own.map(|curve| (curve, contact::furthest(surface, &shapes.curves[curve]).0)).collect::<Vec<_>>()
+        let gap = |curve: usize| (curve, contact::furthest(surface, &shapes.curves[curve]).0);
+        shapes.curves_of(face).into_iter().map(gap).collect::<Vec<_>>()
     };
     faces.into_par_iter().flat_map_iter(of).collect()
 }
@@ -126,24 +127,23 @@ fn gaps(
 /// Sets the tolerances of the edges of faces to their distances from the faces at least.
 fn measure_gaps(shapes: &mut Shapes, contacts: &[[usize; 2]]) {
     let faces: BTreeSet<usize> = contacts.iter().flatten().copied().collect();
-    for (curve, gap) in gaps(shapes, faces, |_| true) {
+    for (curve, gap) in gaps(shapes, faces) {
         let edge = &mut shapes.curves[curve];
         edge.tolerance = edge.tolerance.max(gap);
     }
 }
 
-/// Sets the tolerances of the edges of faces to their measured distances from all faces: files
-/// state much larger ones, within which other edges end.
-fn take_measured_gaps(shapes: &mut Shapes, faces: &BTreeSet<usize>) {
+/// Sets the tolerances of edges and the accuracies of bodies to the measured distances of edges
+/// from their faces: files state much larger ones, within which other edges end.
+pub(super) fn take_measured_gaps(shapes: &mut Shapes) {
     /// Between the places that are measured the distance may be larger.
     const BETWEEN: f64 = 2.0;
-    let curves: BTreeSet<usize> = faces.iter().flat_map(|&face| shapes.curves_of(face)).collect();
-    let gaps = gaps(shapes, (0..shapes.faces.len()).collect(), |curve| curves.contains(&curve));
-    curves.iter().for_each(|&curve| shapes.curves[curve].tolerance = 0.0);
-    for (curve, gap) in gaps {
+    shapes.curves.iter_mut().for_each(|edge| edge.tolerance = 0.0);
+    for (curve, gap) in gaps(shapes, (0..shapes.faces.len()).collect()) {
         let edge = &mut shapes.curves[curve];
         edge.tolerance = edge.tolerance.max(BETWEEN * gap);
     }
+    shapes.take_accuracies();
 }
 
 /// For each face those that touch it.

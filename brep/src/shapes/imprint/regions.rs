@@ -10,17 +10,17 @@ use super::super::{Edges, Shapes};
 use super::contact::lies_on;
 use crate::chart::{Chart, Parameters};
 use crate::shapes::glue::OF_SOLIDS;
-use crate::{Point, Vector};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// An edge on the surface.
-struct Strip {
-    curve: usize,
+#[derive(Clone)]
+pub(super) struct Strip {
+    pub curve: usize,
     ends: [usize; 2],
     /// Parameters along it, and the box around them.
-    nodes: Vec<Parameters>,
+    pub nodes: Vec<Parameters>,
     bounds: [Parameters; 2],
-    length: f64,
+    pub length: f64,
     /// Whether it bounds the face, with the face on the left of its direction.
     own: Option<bool>,
 }
@@ -42,22 +42,28 @@ impl Strip {
 }
 
 /// A strip with a direction: twice its index, plus one against its curve.
-type Half = usize;
+pub(super) type Half = usize;
 
 /// Where a line starts and ends on a strip: shares of its nodes, and of the segment between two.
 const PLACE: [f64; 2] = [0.37, 0.41];
-/// Directions around a corner are those of points this far along the strips (fraction of the
-/// shortest there).
-const AROUND: f64 = 0.1;
-
 /// A line must not leave a strip in the direction of the strip (sine of the angle).
 const ALONG: f64 = 1e-6;
 
-/// The loops of each part of a face, divided by the edges `added` that lie inside of it; `None` if
-/// none does.
-pub(super) fn divided(shapes: &Shapes, number: usize, added: &[usize], size: f64) -> Option<Vec<Vec<Edges>>> {
+/// The loops of each part of a face, divided by those of some curves that lie inside of it; `None`
+/// if none does.
+pub(super) fn divided(
+    shapes: &Shapes,
+    number: usize,
+    curves: &[usize],
+    size: f64,
+) -> Option<Vec<Vec<Edges>>> {
     let chart = Chart::new(&shapes.faces[number].surface, size);
-    let mut strips = strips(shapes, &chart, number, added, size)?;
+    let added = added(shapes, &chart, number, curves, size);
+    if added.is_empty() {
+        return None;
+    }
+    let mut strips = outline(shapes, number, size)?;
+    strips.extend(added);
     loop {
         if strips.is_empty() {
             return None;
@@ -79,10 +85,21 @@ pub(super) fn divided(shapes: &Shapes, number: usize, added: &[usize], size: f64
     }
 }
 
-/// Those of some curves that are inside of a face, whether or not they divide it.
-pub(super) fn inside(shapes: &Shapes, number: usize, curves: &[usize], size: f64) -> BTreeSet<usize> {
+/// Those of some curves that are inside of a face, of which the strips of its own edges are given,
+/// whether or not they divide it.
+pub(super) fn inside(
+    shapes: &Shapes,
+    number: usize,
+    own: &[Strip],
+    curves: &[usize],
+    size: f64,
+) -> BTreeSet<usize> {
     let chart = Chart::new(&shapes.faces[number].surface, size);
-    let Some(strips) = strips(shapes, &chart, number, curves, size) else { return BTreeSet::new() };
+    let mut strips = added(shapes, &chart, number, curves, size);
+    if strips.is_empty() {
+        return BTreeSet::new();
+    }
+    strips.splice(0..0, own.iter().cloned());
     let sheet = Sheet { shapes, chart: &chart, strips: &strips };
     let Some(regions) = sheet.regions() else { return BTreeSet::new() };
     let is_inside =
@@ -90,34 +107,42 @@ pub(super) fn inside(shapes: &Shapes, number: usize, curves: &[usize], size: f64
     strips.iter().enumerate().filter(is_inside).map(|(_, strip)| strip.curve).collect()
 }
 
-/// The edges of a face, and those of `added` that lie on its surface; `None` if none of these do.
-fn strips(shapes: &Shapes, chart: &Chart, number: usize, added: &[usize], size: f64) -> Option<Vec<Strip>> {
+/// The strips of the edges of a face; `None` if it has seams, or edges that cannot be followed.
+pub(super) fn outline(shapes: &Shapes, number: usize, size: f64) -> Option<Vec<Strip>> {
     let face = &shapes.faces[number];
+    let chart = Chart::new(&face.surface, size);
     let own: Edges = face.loops.iter().flatten().copied().collect();
-    let is_own = |curve: usize| own.iter().any(|edge| edge.0 == curve);
-    let may_divide = |&curve: &usize| {
-        let edge = &shapes.curves[curve];
-        !is_own(curve) && lies_on(&face.surface, edge, OF_SOLIDS * size + edge.tolerance)
-    };
-    let added: Vec<usize> = added.iter().copied().filter(may_divide).collect();
-    if added.is_empty() || own.len() > shapes.curves_of(number).len() {
+    if own.len() > shapes.curves_of(number).len() {
         return None;
     }
-    let strip = |curve: usize, own: Option<bool>| {
-        let edge = &shapes.curves[curve];
-        let nodes = chart.along(edge)?;
-        let length =
-            nodes.windows(2).map(|w| (face.surface.point(w[1]) - face.surface.point(w[0])).norm()).sum();
-        Some(Strip::new(curve, edge.ends, nodes, length, own))
-    };
-    let strips: Option<Vec<Strip>> =
-        own.iter().map(|&(curve, is_forward)| strip(curve, Some(is_forward))).collect();
+    let strips: Option<Vec<Strip>> = own
+        .iter()
+        .map(|&(curve, is_forward)| strip(shapes, &chart, number, curve, Some(is_forward)))
+        .collect();
     let mut strips = strips?;
     if face.surface.is_plane() && area(&strips) < 0.0 {
         strips.iter_mut().for_each(|strip| strip.own = strip.own.map(|is_forward| !is_forward));
     }
-    strips.extend(added.into_iter().filter_map(|curve| strip(curve, None)));
     Some(strips)
+}
+
+/// The strips of those of some curves that lie on the surface of a face and are no edges of it.
+fn added(shapes: &Shapes, chart: &Chart, number: usize, curves: &[usize], size: f64) -> Vec<Strip> {
+    let face = &shapes.faces[number];
+    let own = shapes.curves_of(number);
+    let may_divide = |curve: &&usize| {
+        let edge = &shapes.curves[**curve];
+        own.binary_search(curve).is_err() && lies_on(&face.surface, edge, OF_SOLIDS * size + edge.tolerance)
+    };
+    curves.iter().filter(may_divide).filter_map(|&curve| strip(shapes, chart, number, curve, None)).collect()
+}
+
+/// The strip of a curve on the surface of a face; `None` if it cannot be followed.
+fn strip(shapes: &Shapes, chart: &Chart, number: usize, curve: usize, own: Option<bool>) -> Option<Strip> {
+    let (edge, surface) = (&shapes.curves[curve], &shapes.faces[number].surface);
+    let nodes = chart.along(edge)?;
+    let length = nodes.windows(2).map(|w| (surface.point(w[1]) - surface.point(w[0])).norm()).sum();
+    Some(Strip::new(curve, edge.ends, nodes, length, own))
 }
 
 /// Whether the loops of a plane face are clockwise around its normal.
@@ -181,10 +206,10 @@ impl Regions {
     }
 }
 
-struct Sheet<'a> {
-    shapes: &'a Shapes,
-    chart: &'a Chart<'a>,
-    strips: &'a [Strip],
+pub(super) struct Sheet<'a> {
+    pub shapes: &'a Shapes,
+    pub chart: &'a Chart<'a>,
+    pub strips: &'a [Strip],
 }
 
 impl Sheet<'_> {
@@ -250,37 +275,6 @@ impl Sheet<'_> {
             }
         }
         Some(next)
-    }
-
-    /// Half-edges from a corner, counterclockwise.
-    fn sorted(&self, corner: usize, halves: Vec<Half>) -> Option<Vec<Half>> {
-        let point = self.shapes.corners[corner].point;
-        let first = &self.strips[halves[0] / 2].nodes;
-        let [u, v] = if halves[0].is_multiple_of(2) { first[0] } else { first[first.len() - 1] };
-        let normal = self.chart.normal([u, v])?;
-        let step =
-            AROUND * halves.iter().map(|half| self.strips[half / 2].length).fold(f64::INFINITY, f64::min);
-        let ways: Vec<Vector> = halves.iter().map(|&half| self.ahead(half, step) - point).collect();
-        let x = (ways[0] - normal * normal.dot(&ways[0])).try_normalize(0.0)?;
-        let y = normal.cross(&x);
-        let mut keyed: Vec<(f64, Half)> =
-            ways.iter().zip(halves).map(|(way, half)| (way.dot(&y).atan2(way.dot(&x)), half)).collect();
-        keyed.sort_by(|a, b| a.0.total_cmp(&b.0));
-        Some(keyed.into_iter().map(|(_, half)| half).collect())
-    }
-
-    /// A point of a half-edge at a distance from its origin.
-    fn ahead(&self, half: Half, step: f64) -> Point {
-        let edge = &self.shapes.curves[self.strips[half / 2].curve];
-        let [from, to] = if half.is_multiple_of(2) { edge.range } else { [edge.range[1], edge.range[0]] };
-        let at = |share: f64| Point::from(edge.curve.point(from + share * (to - from)));
-        let origin = at(0.0);
-        let (mut near, mut far) = (0.0, 0.5);
-        for _ in 0..30 {
-            let middle = 0.5 * (near + far);
-            if (at(middle) - origin).norm() < step { near = middle } else { far = middle }
-        }
-        at(far)
     }
 
     /// Lines from a strip of each component to one of the first component, as what they cross.

@@ -9,6 +9,7 @@
 //! triangles is not found.
 
 mod fit;
+mod passes;
 mod poles;
 mod rejoin;
 mod seeds;
@@ -20,7 +21,7 @@ mod trace;
 
 use super::{Face, Shapes, imprint, reversed};
 use crate::model::{Corner, EdgeCurve};
-use crate::nearest::nearest_on_curve;
+use crate::nearest::{nearest_on_curve, nearest_on_surface};
 use crate::tessellate::{Shell, Tessellation};
 use crate::{BrepError, Point};
 use fit::Fitted;
@@ -37,6 +38,15 @@ const AT_EDGE: f64 = 10.0;
 /// Two faces cross in at most this many branches.
 const MOST_BRANCHES: usize = 100;
 
+/// What was cut.
+#[derive(Default)]
+pub(crate) struct Cuts {
+    /// Pairs of bodies of which the first is cut out of the second.
+    pub pairs: BTreeSet<[usize; 2]>,
+    /// Bodies without faces now, because they repeat another one, each with that.
+    pub repeated: Vec<[usize; 2]>,
+}
+
 /// What two faces have in common.
 struct Crossing {
     faces: [usize; 2],
@@ -48,8 +58,7 @@ struct Crossing {
 
 impl Shapes {
     /// Cuts the common part of solids that overlap out of all but the one of least `rank`. The
-    /// triangles and shells are those of the model of these shapes. Returns the pairs of bodies of
-    /// which the first is cut out of the second.
+    /// triangles and shells are those of the model of these shapes.
     ///
     /// # Errors
     /// [`BrepError::Solid`] if it cannot be decided what is inside of what, and for a solid of
@@ -59,10 +68,11 @@ impl Shapes {
         tessellation: &Tessellation,
         shells: &[Vec<Shell>],
         rank: &[usize],
-    ) -> Result<BTreeSet<[usize; 2]>, BrepError> {
+    ) -> Result<Cuts, BrepError> {
         let (size, corners) = (self.size(), self.corners.len());
         let patches = self.faces.iter().map(|face| face.id as usize).max().unwrap_or(0);
         let facets = Facets::new(tessellation, patches);
+        imprint::take_measured_gaps(self);
         let contacts = imprint::contacts(self, size);
         self.orient_planes(size);
         let crossings = self.crossings(&facets, tessellation, &contacts, size);
@@ -72,9 +82,9 @@ impl Shapes {
         self.turn_spheres();
         imprint::trim(self, &crossed, size);
         imprint::divide(self, contacts, size);
-        let cut = self.assign(shells, rank)?;
+        let cuts = self.assign(shells, rank)?;
         self.rejoin(corners);
-        Ok(cut)
+        Ok(cuts)
     }
 
     /// Turns loops around planes that are clockwise around the normal.
@@ -128,20 +138,56 @@ impl Shapes {
         let room = imprint::room(self, faces, size);
         let on = [0, 1].map(|k| {
             let surface = &self.faces[faces[1 - k]].surface;
-            let is_near = |curve: &usize| {
-                let points = tessellation.lines[*curve].iter().map(|on| tessellation.points[on.0 as usize]);
-                facets.is_near(patches[1 - k], points, ROOM * size)
-            };
-            let near = self.curves_of(faces[k]).into_iter().filter(is_near);
-            near.filter(|&curve| imprint::lies_on(surface, &self.curves[curve], room)).collect()
+            let near = self.near_curves(facets, tessellation, [faces[k], patches[1 - k]], size);
+            near.into_iter().filter(|&curve| imprint::lies_on(surface, &self.curves[curve], room)).collect()
         });
         let mut crossing = Crossing { faces, on, added: Vec::new() };
         if let Some(bounds) = facets.common(patches, ROOM * size) {
             let pair = Pair { surfaces: faces.map(|face| &self.faces[face].surface), bounds, size };
-            let branches = self.branches(&pair, facets.crossings(patches), &crossing, room);
+            let mut places = facets.crossings(patches);
+            places.extend(self.passes(facets, tessellation, &crossing, size));
+            let branches = self.branches(&pair, places, &crossing, room);
             crossing.added = branches.iter().filter_map(|branch| fit::curve(branch, size)).collect();
         }
         crossing
+    }
+
+    /// The curves of a face that are near a patch.
+    fn near_curves(
+        &self,
+        facets: &Facets,
+        tessellation: &Tessellation,
+        [face, patch]: [usize; 2],
+        size: f64,
+    ) -> Vec<usize> {
+        let is_near = |curve: &usize| {
+            let points = tessellation.lines[*curve].iter().map(|on| tessellation.points[on.0 as usize]);
+            facets.is_near(patch, points, ROOM * size)
+        };
+        self.curves_of(face).into_iter().filter(is_near).collect()
+    }
+
+    /// The places where edges of one face of a crossing pass through the surface of the other one,
+    /// with the parameters on both.
+    fn passes(
+        &self,
+        facets: &Facets,
+        tessellation: &Tessellation,
+        crossing: &Crossing,
+        size: f64,
+    ) -> Vec<(Point, [[f64; 2]; 2])> {
+        let patches = crossing.faces.map(|face| self.faces[face].id as usize - 1);
+        let surfaces = crossing.faces.map(|face| &self.faces[face].surface);
+        let of = |k: usize| {
+            let near = self.near_curves(facets, tessellation, [crossing.faces[k], patches[1 - k]], size);
+            let others = near.into_iter().filter(move |curve| !crossing.on[k].contains(curve));
+            let passes = others.flat_map(move |curve| passes::passes(surfaces[1 - k], &self.curves[curve]));
+            passes.map(move |(place, there)| {
+                let own = nearest_on_surface(surfaces[k], &place).parameters;
+                (place, if k == 0 { [own, there] } else { [there, own] })
+            })
+        };
+        (0..2).flat_map(of).collect()
     }
 
     /// The branches through some places near two surfaces, except those that are edges.
@@ -163,7 +209,9 @@ impl Shapes {
                     // The rest of a circle is an edge of the face beside this one.
                     let is_on_edge = edge.curve.period().is_some()
                         || (edge.range[0]..=edge.range[1]).contains(&foot.parameter);
-                    is_on_edge && (foot.point - start.point).norm() <= AT_EDGE * room
+                    is_on_edge
+                        && ((foot.point - start.point).norm() <= AT_EDGE * room
+                            || pair.gap(&nalgebra::center(&foot.point, &start.point)) <= room)
                 });
             if !is_known && branches.len() < MOST_BRANCHES {
                 let mut branch = pair.branch(start);
@@ -204,40 +252,49 @@ impl Shapes {
 
     /// Leaves out faces inside of solids of lower rank, and gives faces inside of solids of higher
     /// rank to these, too.
-    fn assign(&mut self, shells: &[Vec<Shell>], rank: &[usize]) -> Result<BTreeSet<[usize; 2]>, BrepError> {
+    fn assign(&mut self, shells: &[Vec<Shell>], rank: &[usize]) -> Result<Cuts, BrepError> {
         let sides = self.sides(shells)?;
-        let mut cut = BTreeSet::new();
+        let mut cuts = Cuts::default();
         let mut kept = Vec::new();
-        let mut last_inside = vec![None; rank.len()];
+        let mut taken: Vec<BTreeSet<(usize, bool)>> = vec![BTreeSet::new(); rank.len()];
         for (face, sides) in std::mem::take(&mut self.faces).into_iter().zip(sides) {
             let body = face.body;
             let takes = |&&(other, side): &&(usize, Side)| {
                 rank[other] < rank[body] && matches!(side, Side::Inside | Side::Same)
             };
-            if let Some(&(other, _)) = sides.iter().find(takes) {
-                cut.insert([other, body]);
-                last_inside[body] = Some(other);
+            if let Some(&(other, side)) = sides.iter().find(takes) {
+                cuts.pairs.insert([other, body]);
+                taken[body].insert((other, side == Side::Same));
                 continue;
             }
             let beside = sides.iter().filter(|(_, side)| matches!(side, Side::Inside | Side::Opposite));
             if let Some(&(other, Side::Inside)) = beside.min_by_key(|(other, _)| rank[*other]) {
-                cut.insert([body, other]);
+                cuts.pairs.insert([body, other]);
                 kept.push(Face { body: other, is_behind: !face.is_behind, ..face.clone() });
             }
             kept.push(face);
         }
         self.faces = kept;
         let left: HashSet<usize> = self.faces.iter().map(|face| face.body).collect();
-        let gone = (0..rank.len()).find(|body| !left.contains(body) && last_inside[*body].is_some());
-        if let Some((body, Some(other))) = gone.map(|body| (body, last_inside[body])) {
-            let what = format!(
-                "nothing is left of it: it lies inside of solid {}, which keeps what both have: give that to the \
-                 smaller solid, or leave one of them out",
-                other + 1
-            );
-            return Err(BrepError::solid(body, what, None));
+        for body in (0..rank.len()).filter(|body| !left.contains(body)) {
+            let mut by = taken[body].iter();
+            match (by.next(), by.next()) {
+                (Some(&(other, true)), None) => {
+                    cuts.pairs.remove(&[other, body]);
+                    cuts.repeated.push([body, other]);
+                }
+                (Some(&(other, _)), _) => {
+                    let what = format!(
+                        "nothing is left of it: it lies inside of solid {}, which keeps what both have: give that \
+                         to the smaller solid, or leave one of them out",
+                        other + 1
+                    );
+                    return Err(BrepError::solid(body, what, None));
+                }
+                (None, _) => {}
+            }
         }
-        Ok(cut)
+        Ok(cuts)
     }
 
     /// The bodies near each face, with the side of them on which it is.

@@ -151,3 +151,68 @@ fn faces_of_a_solid_may_be_tangent_to_each_other_where_another_one_meets_them() 
     assert_near(&volumes, &[48.0 - 4.5 * PI, 45.0 * PI]);
     assert_near(&[area], &[3.0 * PI]);
 }
+
+#[test]
+fn faces_with_the_same_edges_may_have_their_solids_on_the_same_side() {
+    let mut solids = Solids::default();
+    solids.block([0.0; 3], [2.0; 3]);
+    solids.block([0.0; 3], [2.0, 2.0, 3.0]);
+    let (_, volumes, area) = cut(solids, OverlapTo::First);
+    assert_near(&volumes, &[8.0, 4.0]);
+    assert_near(&[area], &[4.0]);
+}
+
+#[test]
+fn a_solid_that_repeats_another_one_is_left_out() {
+    let mut solids = Solids::default();
+    solids.block([0.0; 3], [2.0; 3]);
+    solids.block([3.0; 3], [4.0; 3]);
+    solids.block([0.0; 3], [2.0; 3]);
+    solids.block([3.0; 3], [4.0; 3]);
+    solids.block([5.0; 3], [7.0, 6.0, 6.0]);
+    solids.block([3.0; 3], [4.0; 3]);
+    let (model, volumes, area) = cut(solids, OverlapTo::First);
+    assert_near(&volumes, &[8.0, 1.0, 2.0]);
+    assert_eq!((model.bodies, area), (3, 0.0));
+    let repeats = |body: usize, other: usize| format!("solid {body} repeats solid {other}: left out");
+    assert_eq!(model.notes, [repeats(3, 1), repeats(4, 2), repeats(6, 2)]);
+}
+
+#[test]
+fn edges_are_cut_off_that_stand_out_by_less_than_the_accuracy_that_the_file_states() {
+    let mut solids = Solids::default();
+    solids.block([0.0; 3], [2.0; 3]);
+    // A bevelled post whose side is 2e-4 in front of that of the block.
+    let post = [[1.0, 1.0], [2.0002, 1.0], [2.0002, 1.5], [1.5, 2.0002], [1.0, 2.0002]];
+    solids.prism(&post.map(|[x, y]| X * x + Y * y), [-1.0, 1.0], &[]);
+    solids.set_accuracy(0.01);
+    let (_, volumes, area) = cut(solids, OverlapTo::First);
+    assert_near(&volumes, &[8.0, 0.875]);
+    // The section of the post, and what is left of it in front of two sides of the block.
+    assert_near(&[area], &[0.875 + 0.5 + 0.5]);
+}
+
+#[test]
+fn walls_that_cross_at_a_very_small_angle_are_cut() {
+    // At an angle of 6e-4.
+    let mut solids = Solids::default();
+    solids.pin(Vector::zeros(), 0.5, [0.0, 2.0], 0.2);
+    solids.pin(X * 3e-4, 0.5, [1.0, 3.0], 1.2);
+    let (model, volumes, area) = cut(solids, OverlapTo::First);
+    assert_near(&volumes, &[0.5 * PI, 0.25 * PI]);
+    assert_near(&[area], &[0.25 * PI + 0.5 * PI]);
+    assert!(model.notes[0].starts_with("solids overlap: cut solid 1 out of solid 2"), "{:?}", model.notes);
+}
+
+#[test]
+fn common_parts_thinner_than_the_error_of_triangles_are_cut() {
+    // The block reaches 1e-4 into the pin.
+    let mut solids = Solids::default();
+    solids.pin(Vector::zeros(), 5.0, [0.0, 2.0], 0.2);
+    solids.block([4.9999, -1.0, 0.5], [6.0, 1.0, 1.5]);
+    let (model, volumes, area) = cut(solids, OverlapTo::First);
+    assert_near(&volumes, &[50.0 * PI, 2.0]);
+    assert!(model.notes[0].starts_with("solids overlap: cut solid 1 out of solid 2"), "{:?}", model.notes);
+    // A strip between two lines, as wide as the chord at that depth.
+    assert!((area - 2.0 * f64::sqrt(2.0 * 5.0 * 1e-4)).abs() < 1e-4, "{area}");
+}

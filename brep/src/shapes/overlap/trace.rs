@@ -4,13 +4,14 @@
 //! the next one is sought along the cross product of the normals (Patrikalakis and Maekawa 2002,
 //! "Shape Interrogation for Computer Aided Design and Manufacturing", sections 5.8.1 and 5.8.2).
 
+use crate::nearest::nearest_on_surface;
 use crate::project::project_to_surface;
 use crate::{Point, Surface, Vector};
 
 /// The most steps of Newton's method; it converges quadratically.
 const NEWTON_STEPS: usize = 30;
 /// Surfaces that meet at a smaller angle (radians) touch each other: no branch is followed.
-const LEAST_ANGLE: f64 = 1e-3;
+const LEAST_ANGLE: f64 = 1e-5;
 /// A branch turns at most by this angle (radians) in a step.
 const MOST_TURN: f64 = 0.4;
 /// The curve between two points is this close to the surfaces (fraction of the diagonal).
@@ -68,6 +69,12 @@ pub(super) struct Pair<'a> {
 impl Pair<'_> {
     pub fn contains(&self, point: &Point) -> bool {
         (0..3).all(|axis| (self.bounds[0][axis]..=self.bounds[1][axis]).contains(&point[axis]))
+    }
+
+    /// How far the surfaces are apart at a place near them.
+    pub fn gap(&self, place: &Point) -> f64 {
+        let [a, b] = self.surfaces.map(|surface| nearest_on_surface(surface, place).point);
+        (b - a).norm()
     }
 
     /// The point of both surfaces nearest to one near them; `None` if there is none, or if the
