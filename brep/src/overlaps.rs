@@ -2,8 +2,8 @@
 
 use crate::BrepError;
 use crate::model::Model;
-use crate::shapes::{Cuts, Shapes};
-use crate::tessellate::{Settings, Tessellation, volume};
+use crate::shapes::{Care, Cuts, Shapes};
+use crate::tessellate::{Settings, Shell, Tessellation, volume};
 
 /// How finely faces are triangulated to find where they cross.
 const SETTINGS: Settings = Settings { chord: 5e-4, angle: 0.15 };
@@ -58,13 +58,12 @@ impl Model {
         }
         let mut rank = vec![0; self.bodies];
         order.into_iter().enumerate().for_each(|(place, body)| rank[body] = place);
-        let mut shapes = Shapes::of(self);
-        let Cuts { pairs: cut, repeated } = shapes.cut_overlaps(&tessellation, &shells, &rank)?;
-        if cut.is_empty() && repeated.is_empty() {
-            return Ok(());
-        }
-        let gone: Vec<usize> = repeated.iter().map(|pair| pair[0]).collect();
-        let mut model = shapes.remake(self, &gone)?;
+        let cut = |care: Care| self.cut(care, &tessellation, &shells, &rank);
+        let made = match cut(Care::Usual) {
+            Ok(Some(made)) => Some(made),
+            Ok(None) | Err(_) => cut(Care::High)?,
+        };
+        let Some((mut model, Cuts { pairs: cut, repeated })) = made else { return Ok(()) };
         for &[body, other] in &repeated {
             let note = format!("{} repeats {}: left out", self.solid(body), self.solid(other));
             model.notes.push(note);
@@ -82,6 +81,26 @@ impl Model {
         }
         *self = model;
         Ok(())
+    }
+
+    /// The model with the common parts cut out, which is checked, and what was cut; `None` if
+    /// nothing was.
+    fn cut(
+        &self,
+        care: Care,
+        tessellation: &Tessellation,
+        shells: &[Vec<Shell>],
+        rank: &[usize],
+    ) -> Result<Option<(Self, Cuts)>, BrepError> {
+        let mut shapes = Shapes::of(self);
+        let cuts = shapes.cut_overlaps(care, tessellation, shells, rank)?;
+        if cuts.pairs.is_empty() && cuts.repeated.is_empty() {
+            return Ok(None);
+        }
+        let gone: Vec<usize> = cuts.repeated.iter().map(|pair| pair[0]).collect();
+        let model = shapes.remake(self, &gone)?;
+        Tessellation::of(&mut model.clone(), &SETTINGS)?;
+        Ok(Some((model, cuts)))
     }
 
     /// A body as messages name it.

@@ -11,7 +11,7 @@ mod tests;
 mod without_area;
 
 pub(crate) use enclose::left_out;
-pub(crate) use overlap::Cuts;
+pub(crate) use overlap::{Care, Cuts};
 
 use crate::chart::{Chart, Loop, Side, close};
 use crate::model::{AWAY, Corner, Fin, Model, On, Patch};
@@ -106,8 +106,8 @@ impl Shapes {
         shapes
     }
 
-    /// Sets the accuracy of each body to the least tolerance of its edges: programs give worse edges
-    /// larger tolerances.
+    /// Sets the accuracy of each body to the least tolerance of its edges: programs give worse
+    /// edges larger tolerances.
     fn take_accuracies(&mut self) {
         self.accuracy.fill(f64::INFINITY);
         for face in &self.faces {

@@ -133,8 +133,8 @@ fn measure_gaps(shapes: &mut Shapes, contacts: &[[usize; 2]]) {
     }
 }
 
-/// Sets the tolerances of edges and the accuracies of bodies to the measured distances of edges
-/// from their faces: files state much larger ones, within which other edges end.
+/// Sets the tolerances of edges to their measured distances from their faces: files state much
+/// larger ones, within which other edges end.
 pub(super) fn take_measured_gaps(shapes: &mut Shapes) {
     /// Between the places that are measured the distance may be larger.
     const BETWEEN: f64 = 2.0;
@@ -143,7 +143,6 @@ pub(super) fn take_measured_gaps(shapes: &mut Shapes) {
         let edge = &mut shapes.curves[curve];
         edge.tolerance = edge.tolerance.max(BETWEEN * gap);
     }
-    shapes.take_accuracies();
 }
 
 /// For each face those that touch it.

@@ -38,8 +38,8 @@ impl Sheet<'_> {
         Some(keyed.into_iter().map(|(_, half)| half).collect())
     }
 
-    /// The angles of half-edges around a place of a crease, in the parameters: seen along the normal
-    /// of one side of the crease, those on the other side may be anywhere. `None` if there is none.
+    /// The angles of half-edges around a place of a crease, in the parameters: seen along the
+    /// normal of one side of it, those on the other side may be anywhere. `None` if there is none.
     fn around_crease(
         &self,
         at: Parameters,

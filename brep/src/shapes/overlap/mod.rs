@@ -5,8 +5,8 @@
 //! the common part are left out, and its own faces there become those of the other solid, too.
 //!
 //! Curves are followed over whole surfaces, as far as the faces' boxes overlap, and trimmed. They
-//! start where triangles of both faces cross: an overlap that is thinner than the error of these
-//! triangles is not found.
+//! start where triangles of both faces cross, and with more care where edges pass through faces: an
+//! overlap that is thinner than the error of these triangles and inside of both faces is not found.
 
 mod fit;
 mod passes;
@@ -38,6 +38,17 @@ const AT_EDGE: f64 = 10.0;
 /// Two faces cross in at most this many branches.
 const MOST_BRANCHES: usize = 100;
 
+/// How closely solids are compared.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Care {
+    /// Places within the accuracy that the file states are one, and branches start where triangles
+    /// cross.
+    Usual,
+    /// Places as close as edges are to their faces are one: many programs state an accuracy of 0.01
+    /// whatever a file holds. Branches also start where edges pass through faces.
+    High,
+}
+
 /// What was cut.
 #[derive(Default)]
 pub(crate) struct Cuts {
@@ -65,6 +76,7 @@ impl Shapes {
     /// which nothing is left.
     pub fn cut_overlaps(
         &mut self,
+        care: Care,
         tessellation: &Tessellation,
         shells: &[Vec<Shell>],
         rank: &[usize],
@@ -73,9 +85,12 @@ impl Shapes {
         let patches = self.faces.iter().map(|face| face.id as usize).max().unwrap_or(0);
         let facets = Facets::new(tessellation, patches);
         imprint::take_measured_gaps(self);
+        if care == Care::High {
+            self.take_accuracies();
+        }
         let contacts = imprint::contacts(self, size);
         self.orient_planes(size);
-        let crossings = self.crossings(&facets, tessellation, &contacts, size);
+        let crossings = self.crossings(care, &facets, tessellation, &contacts, size);
         let crossed: Vec<[usize; 2]> =
             crossings.iter().filter(|one| !one.added.is_empty()).map(|one| one.faces).collect();
         crossings.into_iter().for_each(|crossing| self.add_crossing(crossing, size));
@@ -100,6 +115,7 @@ impl Shapes {
     /// Where faces of different bodies cross that have not the same surface.
     fn crossings(
         &self,
+        care: Care,
         facets: &Facets,
         tessellation: &Tessellation,
         contacts: &[[usize; 2]],
@@ -123,12 +139,13 @@ impl Shapes {
         };
         let mut pairs: Vec<[usize; 2]> = (0..order.len()).into_par_iter().flat_map_iter(beside).collect();
         pairs.sort_unstable();
-        let cross = |faces: &[usize; 2]| self.crossing(facets, tessellation, *faces, size);
+        let cross = |faces: &[usize; 2]| self.crossing(care, facets, tessellation, *faces, size);
         pairs.par_iter().map(cross).collect()
     }
 
     fn crossing(
         &self,
+        care: Care,
         facets: &Facets,
         tessellation: &Tessellation,
         faces: [usize; 2],
@@ -145,7 +162,9 @@ impl Shapes {
         if let Some(bounds) = facets.common(patches, ROOM * size) {
             let pair = Pair { surfaces: faces.map(|face| &self.faces[face].surface), bounds, size };
             let mut places = facets.crossings(patches);
-            places.extend(self.passes(facets, tessellation, &crossing, size));
+            if care == Care::High {
+                places.extend(self.passes(facets, tessellation, &crossing, size));
+            }
             let branches = self.branches(&pair, places, &crossing, room);
             crossing.added = branches.iter().filter_map(|branch| fit::curve(branch, size)).collect();
         }

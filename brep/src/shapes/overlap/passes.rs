@@ -1,7 +1,7 @@
 //! Places where edges of a face pass through the surface of another one.
 //!
-//! Each branch that is not closed inside of both faces ends at such a place, however thin the common
-//! part of the solids is there.
+//! Each branch that is not closed inside of both faces ends at such a place, however thin the
+//! common part of the solids is there.
 
 use crate::nearest::nearest_on_surface;
 use crate::project::project_to_surface;

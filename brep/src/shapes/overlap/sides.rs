@@ -26,7 +26,7 @@ pub(super) enum Side {
 }
 
 /// Faces whose directions from a curve differ by less (radians) are tangent there.
-const TANGENT: f64 = 1e-5;
+const TANGENT: f64 = 1e-3;
 /// Places are this far beside a curve (share of its length up to where it is asked).
 const BESIDE: f64 = 0.1;
 /// Where curves are asked (share of their range).
