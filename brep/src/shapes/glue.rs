@@ -181,7 +181,7 @@ pub(super) fn glue_patches(model: &mut Model, tolerance: f64) -> Vec<usize> {
 
 /// The curves that bound a patch, in ascending order, without seams, which each program puts
 /// elsewhere.
-fn bounds(patch: &Patch) -> Vec<usize> {
+pub(crate) fn bounds(patch: &Patch) -> Vec<usize> {
     let mut all: Vec<usize> = patch.loops.iter().flatten().filter_map(curve_of).collect();
     all.sort_unstable();
     all.chunk_by(|a, b| a == b).filter(|uses| uses.len() == 1).flatten().copied().collect()
@@ -200,7 +200,7 @@ const BESIDE: f64 = 0.02;
 const AROUND: f64 = 0.05;
 
 /// Whether two patches between the same curves have the same surface there.
-fn is_same_surface(model: &Model, one: &Patch, other: &Patch, tolerance: f64) -> bool {
+pub(crate) fn is_same_surface(model: &Model, one: &Patch, other: &Patch, tolerance: f64) -> bool {
     if one.surface.is_plane() || other.surface.is_plane() {
         return one.surface.is_plane() && other.surface.is_plane();
     }

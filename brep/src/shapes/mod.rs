@@ -11,6 +11,7 @@ mod tests;
 mod without_area;
 
 pub(crate) use enclose::left_out;
+pub(crate) use glue::{bounds, is_same_surface};
 pub(crate) use overlap::{Care, Cuts};
 
 use crate::chart::{Chart, Loop, Side, close};
@@ -233,7 +234,7 @@ impl Shapes {
 }
 
 /// Surfaces that differ by at most this (fraction of the diagonal) are one.
-const SAME: f64 = 1e-6;
+pub(crate) const SAME: f64 = 1e-6;
 
 /// Makes the patch of a face whose loops were followed on its surface; those of planes need not be.
 fn patch(

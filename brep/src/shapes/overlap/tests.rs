@@ -1,7 +1,7 @@
 //! Solids that overlap, made by hand.
 
 use crate::shapes::tests::{Solids, X, Y, Z, measured, square};
-use crate::{Model, OverlapTo, Unit, Vector};
+use crate::{Model, OverlapTo, Settings, Tessellation, Unit, Vector};
 use std::f64::consts::PI;
 
 fn cut(solids: Solids, to: OverlapTo) -> (Model, Vec<f64>, f64) {
@@ -154,10 +154,15 @@ fn faces_of_a_solid_may_be_tangent_to_each_other_where_another_one_meets_them() 
 
 #[test]
 fn faces_with_the_same_edges_may_have_their_solids_on_the_same_side() {
-    let mut solids = Solids::default();
-    solids.block([0.0; 3], [2.0; 3]);
-    solids.block([0.0; 3], [2.0, 2.0, 3.0]);
-    let (_, volumes, area) = cut(solids, OverlapTo::First);
+    let solids = || {
+        let mut solids = Solids::default();
+        solids.block([0.0; 3], [2.0; 3]);
+        solids.block([0.0; 3], [2.0, 2.0, 3.0]);
+        solids
+    };
+    let error = Tessellation::of(&mut solids().model(), &Settings::default()).unwrap_err().to_string();
+    assert!(error.contains("solid 2: it overlaps solid 1, or lies inside of it"), "{error}");
+    let (_, volumes, area) = cut(solids(), OverlapTo::First);
     assert_near(&volumes, &[8.0, 4.0]);
     assert_near(&[area], &[4.0]);
 }
