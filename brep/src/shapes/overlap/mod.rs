@@ -153,17 +153,18 @@ impl Shapes {
     ) -> Crossing {
         let patches = faces.map(|face| self.faces[face].id as usize - 1);
         let room = imprint::room(self, faces, size);
+        let near = [0, 1].map(|k| self.near_curves(facets, tessellation, [faces[k], patches[1 - k]], size));
         let on = [0, 1].map(|k| {
             let surface = &self.faces[faces[1 - k]].surface;
-            let near = self.near_curves(facets, tessellation, [faces[k], patches[1 - k]], size);
-            near.into_iter().filter(|&curve| imprint::lies_on(surface, &self.curves[curve], room)).collect()
+            let lies_on = |curve: &usize| imprint::lies_on(surface, &self.curves[*curve], room);
+            near[k].iter().copied().filter(lies_on).collect()
         });
         let mut crossing = Crossing { faces, on, added: Vec::new() };
         if let Some(bounds) = facets.common(patches, ROOM * size) {
             let pair = Pair { surfaces: faces.map(|face| &self.faces[face].surface), bounds, size };
             let mut places = facets.crossings(patches);
             if care == Care::High {
-                places.extend(self.passes(facets, tessellation, &crossing, size));
+                places.extend(self.passes(&near, &crossing));
             }
             let branches = self.branches(&pair, places, &crossing, room);
             crossing.added = branches.iter().filter_map(|branch| fit::curve(branch, size)).collect();
@@ -186,20 +187,12 @@ impl Shapes {
         self.curves_of(face).into_iter().filter(is_near).collect()
     }
 
-    /// The places where edges of one face of a crossing pass through the surface of the other one,
-    /// with the parameters on both.
-    fn passes(
-        &self,
-        facets: &Facets,
-        tessellation: &Tessellation,
-        crossing: &Crossing,
-        size: f64,
-    ) -> Vec<(Point, [[f64; 2]; 2])> {
-        let patches = crossing.faces.map(|face| self.faces[face].id as usize - 1);
+    /// The places where edges of one face of a crossing, those of each that are near the other one,
+    /// pass through the surface of that, with the parameters on both.
+    fn passes(&self, near: &[Vec<usize>; 2], crossing: &Crossing) -> Vec<(Point, [[f64; 2]; 2])> {
         let surfaces = crossing.faces.map(|face| &self.faces[face].surface);
         let of = |k: usize| {
-            let near = self.near_curves(facets, tessellation, [crossing.faces[k], patches[1 - k]], size);
-            let others = near.into_iter().filter(move |curve| !crossing.on[k].contains(curve));
+            let others = near[k].iter().copied().filter(move |curve| !crossing.on[k].contains(curve));
             let passes = others.flat_map(move |curve| passes::passes(surfaces[1 - k], &self.curves[curve]));
             passes.map(move |(place, there)| {
                 let own = nearest_on_surface(surfaces[k], &place).parameters;
