@@ -167,11 +167,13 @@ fn smallest_and_bad<const N: usize>(
     mesh: &BareMesh,
     angles: [f64; N],
 ) -> Result<(f64, [u64; N]), CommError> {
-    let (mut smallest, mut bad) = (f64::INFINITY, [0; N]);
-    for tet in 0..mesh.tets.len() {
-        let here = regions::smallest_angle(mesh, tet);
-        smallest = smallest.min(here);
-        bad.iter_mut().zip(angles).for_each(|(bad, angle)| *bad += u64::from(here < angle));
+    let (mut largest, mut bad) = (-1.0, [0; N]);
+    let cosines = angles.map(|angle| angle.to_radians().cos());
+    for tet in &mesh.tets {
+        let here = regions::cosine(mesh, tet);
+        largest = here.max(largest);
+        bad.iter_mut().zip(cosines).for_each(|(bad, cosine)| *bad += u64::from(here > cosine));
     }
+    let smallest = largest.acos().to_degrees();
     Ok((comm.all_reduce_min_f64([smallest])?[0], comm.all_reduce_sum_u64(bad)?))
 }

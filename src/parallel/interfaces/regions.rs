@@ -30,10 +30,9 @@ pub(super) struct Regions {
     inside: Vec<bool>,
 }
 
-/// The smallest dihedral angle of a tet, degrees.
-pub(super) fn smallest_angle(mesh: &BareMesh, tet: usize) -> f64 {
-    let corners = mesh.tets[tet].map(|v| Point::from(mesh.points[v.index()]));
-    largest_cosine(&corners).acos().to_degrees()
+/// The cosine of the smallest dihedral angle of a tet.
+pub(super) fn cosine(mesh: &BareMesh, tet: &[VertexId; 4]) -> f64 {
+    largest_cosine(&tet.map(|v| Point::from(mesh.points[v.index()])))
 }
 
 /// *Local.* The tets near interfaces with a smaller dihedral angle than `angle` (degrees).
@@ -46,10 +45,9 @@ pub(super) fn bad_tets(mesh: &BareMesh, angle: f64) -> Vec<u32> {
             tet.iter().for_each(|v| near[v.index()] = true);
         }
     }
-    let is_bad = |&tet: &u32| {
-        mesh.tets[tet as usize].iter().any(|v| near[v.index()]) && smallest_angle(mesh, tet as usize) < angle
-    };
-    (0..mesh.tets.len() as u32).filter(is_bad).collect()
+    let most = angle.to_radians().cos();
+    let is_bad = |tet: &[VertexId; 4]| tet.iter().any(|v| near[v.index()]) && cosine(mesh, tet) > most;
+    (0..).zip(&mesh.tets).filter(|(_, tet)| is_bad(tet)).map(|(tet, _)| tet).collect()
 }
 
 /// **Collective.** Regions: the bad tets and those that touch them, without the `fixed` ones.
@@ -75,9 +73,10 @@ pub(super) fn around(
     share(comm, mesh, &mut labels)?;
     let is_near = |tet: &[VertexId; 4]| tet.iter().any(|v| labels[v.index()] != NONE);
     let inside: Vec<bool> = mesh.tets.iter().zip(fixed).map(|(tet, &fixed)| !fixed && is_near(tet)).collect();
+    let of_regions: Vec<&[VertexId; 4]> =
+        mesh.tets.iter().zip(&inside).filter(|(_, inside)| **inside).map(|(tet, _)| tet).collect();
     for _ in 0..REACH {
-        let of_regions = (0..mesh.tets.len()).filter(|&tet| inside[tet]);
-        spread(comm, mesh, of_regions, &mut labels)?;
+        spread(comm, mesh, &of_regions, &mut labels)?;
     }
     let destination = |(tet, &inside): (&[VertexId; 4], &bool)| {
         if inside { least(tet, &labels)[1] as Rank } else { mesh.rank }
@@ -95,12 +94,11 @@ fn least(tet: &[VertexId; 4], labels: &[Label]) -> Label {
 fn spread(
     comm: &dyn Communicator,
     mesh: &BareMesh,
-    tets: impl Iterator<Item = usize>,
+    tets: &[&[VertexId; 4]],
     labels: &mut [Label],
 ) -> Result<(), CommError> {
     let before = labels.to_vec();
     for tet in tets {
-        let tet = &mesh.tets[tet];
         let label = least(tet, &before);
         tet.iter().for_each(|v| labels[v.index()] = labels[v.index()].min(label));
     }
