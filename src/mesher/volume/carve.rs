@@ -4,6 +4,7 @@ use super::constraints::Constraints;
 use super::tetrahedra::{NO_BODY, Tetrahedra};
 use crate::mesher::half_face::NONE;
 use csg::BodyId;
+use rayon::prelude::*;
 
 /// Label of tets outside all bodies until they are removed.
 const OUTSIDE: u32 = NO_BODY - 1;
@@ -29,28 +30,34 @@ pub(super) fn carve(
     regions: &[[Option<BodyId>; 2]],
     far: u32,
 ) -> Result<(), Disagreement> {
-    let slots = mesh.tets.len() as u32;
+    let assigned = assigned(mesh, constraints, regions);
     let mut open = Vec::new();
     flood(mesh, mesh.at_vertex[far as usize], OUTSIDE, &mut open);
-    for t in 0..slots {
-        if mesh.is_alive(t) {
-            for half_face in 4 * t..4 * t + 4 {
-                if !mesh.is_locked(half_face) {
-                    continue;
-                }
-                let (triangle, region) = triangle_and_region(mesh, constraints, regions, half_face);
-                let (label, known) = (label(region), mesh.bodies[t as usize]);
-                if known == NO_BODY {
-                    flood(mesh, t, label, &mut open);
-                } else if known != label {
-                    let regions = [region, (known != OUTSIDE).then_some(BodyId(known))];
-                    return Err(Disagreement { triangle, regions });
-                }
-            }
+    for (t, (triangle, region)) in assigned {
+        let (label, known) = (label(region), mesh.bodies[t as usize]);
+        if known == NO_BODY {
+            flood(mesh, t, label, &mut open);
+        } else if known != label {
+            let regions = [region, (known != OUTSIDE).then_some(BodyId(known))];
+            return Err(Disagreement { triangle, regions });
         }
     }
     remove_outside(mesh);
     Ok(())
+}
+
+/// For each locked half-face its tet, its triangle, and the region that it assigns to the tet.
+fn assigned(
+    mesh: &Tetrahedra,
+    constraints: &Constraints,
+    regions: &[[Option<BodyId>; 2]],
+) -> Vec<(u32, (u32, Option<BodyId>))> {
+    let of_tet = |t: u32| {
+        let half_faces = if mesh.is_alive(t) { 4 * t..4 * t + 4 } else { 0..0 };
+        let locked = half_faces.filter(|&half_face| mesh.is_locked(half_face));
+        locked.map(move |half_face| (t, triangle_and_region(mesh, constraints, regions, half_face)))
+    };
+    (0..mesh.tets.len() as u32).into_par_iter().flat_map_iter(of_tet).collect()
 }
 
 fn label(region: Option<BodyId>) -> u32 {

@@ -1,8 +1,10 @@
 //! The edges and faces that must stay in the mesh: those of the surface, and the parts of split
 //! ones.
 
+use super::tetrahedra::Tetrahedra;
 use crate::ground::kernel::hash::WordHash;
 use crate::ground::kernel::simplex::ascending;
+use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// A triangle of the surface, or a part of it if Steiner points split it.
@@ -85,6 +87,16 @@ impl Constraints {
     #[inline]
     pub fn facet(&self, face: [u32; 3]) -> Option<u32> {
         self.by_vertices.get(&ascending(face)).copied()
+    }
+
+    /// The faces of a mesh that are facets: from one side each, with the facet, ascending.
+    pub fn faces_in(&self, mesh: &Tetrahedra) -> Vec<(u32, u32)> {
+        let of_tet = |t: u32| {
+            let half_faces = if mesh.is_alive(t) { 4 * t..4 * t + 4 } else { 0..0 };
+            let once = half_faces.filter(|&h| h < mesh.across(h));
+            once.filter_map(|h| Some((h, self.facet(mesh.face(h))?)))
+        };
+        (0..mesh.tets.len() as u32).into_par_iter().flat_map_iter(of_tet).collect()
     }
 
     /// Whether these are the ends of an edge of a facet.

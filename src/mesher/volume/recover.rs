@@ -76,14 +76,8 @@ impl<'a> Recovery<'a> {
     /// The facets that are not faces of the mesh, in the order of this attempt.
     pub(super) fn missing_facets(&self) -> Vec<u32> {
         let mut present = vec![false; self.constraints.facets.len()];
-        for t in self.mesh.alive() {
-            for half_face in 4 * t..4 * t + 4 {
-                if half_face < self.mesh.across(half_face)
-                    && let Some(facet) = self.constraints.facet(self.mesh.face(half_face))
-                {
-                    present[facet as usize] = true;
-                }
-            }
+        for (_, facet) in self.constraints.faces_in(self.mesh) {
+            present[facet as usize] = true;
         }
         let mut missing: Vec<u32> = self.constraints.alive().filter(|&f| !present[f as usize]).collect();
         self.shuffle(&mut missing, |&f| u64::from(f));
@@ -178,15 +172,7 @@ impl<'a> Recovery<'a> {
 
 /// Locks all faces that are facets; every facet must be a face.
 pub(super) fn lock_facets(mesh: &mut Tetrahedra, constraints: &Constraints) {
-    let mut locked = 0;
-    for half_face in (0..mesh.tets.len() as u32).flat_map(|t| 4 * t..4 * t + 4) {
-        if mesh.is_alive(half_face >> 2)
-            && half_face < mesh.across(half_face)
-            && constraints.facet(mesh.face(half_face)).is_some()
-        {
-            mesh.lock(half_face);
-            locked += 1;
-        }
-    }
-    assert_eq!(locked, constraints.alive().count(), "a facet is not a face of the mesh");
+    let faces = constraints.faces_in(mesh);
+    assert_eq!(faces.len(), constraints.alive().count(), "a facet is not a face of the mesh");
+    faces.into_iter().for_each(|(half_face, _)| mesh.lock(half_face));
 }

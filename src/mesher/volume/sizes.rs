@@ -39,17 +39,17 @@ impl Filler<'_> {
     /// Initialises the size at each vertex: that of the field or of the boundary edges if that is
     /// less. If both are infinite, it is the size grown from the neighbours.
     pub(super) fn size_vertices(&mut self) {
+        let has_tets = |v: usize| self.mesh.at_vertex[v] != NONE;
+        let field = |v: usize| if has_tets(v) { self.field_size(&self.mesh.points[v]) } else { 0.0 };
+        self.sizes = (0..self.mesh.points.len()).into_par_iter().map(field).collect();
         for (v, (sum, count)) in skin_edges(self.mesh).into_iter().enumerate() {
-            let mut size = 0.0;
             if self.mesh.at_vertex[v] != NONE {
                 let point = self.mesh.points[v];
-                size = self.field_size(&point);
-                self.note_size(&point, size);
-                if count > 0 {
-                    size = size.min(SKIN_TOLERANCE * sum / f64::from(count));
-                }
+                self.note_size(&point, self.sizes[v]);
             }
-            self.sizes.push(size);
+            if count > 0 {
+                self.sizes[v] = self.sizes[v].min(SKIN_TOLERANCE * sum / f64::from(count));
+            }
         }
         let mut infinite: Vec<u32> =
             (0u32..).zip(&self.sizes).filter(|&(_, &size)| size == f64::INFINITY).map(|(v, _)| v).collect();
