@@ -325,6 +325,25 @@ fn solids_with_a_gap_below_the_accuracy_that_the_file_states_stay_apart() {
 }
 
 #[test]
+fn sides_of_a_face_narrower_than_the_accuracy_that_the_file_states_have_no_common_corner() {
+    const WIDTH: f64 = 0.005;
+    let narrow = |other: [[f64; 3]; 2]| {
+        let mut solids = Solids::default();
+        solids.block([0.0; 3], [1.0, WIDTH, 1.0]);
+        let [from, to] = other;
+        solids.block(from, to);
+        solids.set_accuracy(0.01);
+        solids
+    };
+    // Across it, and with an edge along one side.
+    let across = narrow([[0.3, -1.0, 1.0], [0.6, 1.0, 2.0]]);
+    let model = assert_measures(across, &[WIDTH, 0.6], 0.3 * WIDTH);
+    assert_eq!(model.corners.len(), 20);
+    let along = narrow([[0.2, WIDTH, 1.0], [0.8, 1.0, 2.0]]);
+    assert_measures(along, &[WIDTH, 0.6 * (1.0 - WIDTH)], 0.0);
+}
+
+#[test]
 fn solids_that_touch_in_a_line_stay_apart() {
     let mut solids = Solids::default();
     solids.block([0.0; 3], [1.0; 3]);

@@ -12,6 +12,43 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 /// Where curves are to be divided: parameters and corners.
 type Divisions = BTreeMap<usize, Vec<(f64, usize)>>;
 
+/// The faces that curves bound.
+struct Bounded(HashMap<usize, Vec<usize>>);
+
+impl Bounded {
+    fn of(shapes: &Shapes) -> Self {
+        let mut faces: HashMap<usize, Vec<usize>> = HashMap::new();
+        for face in 0..shapes.faces.len() {
+            shapes.curves_of(face).into_iter().for_each(|curve| faces.entry(curve).or_default().push(face));
+        }
+        Self(faces)
+    }
+
+    /// Whether two curves are sides of one face without a common end: no corner is on both, however
+    /// narrow the face.
+    fn are_apart(&self, shapes: &Shapes, [a, b]: [usize; 2]) -> bool {
+        let [of_a, of_b] = [a, b].map(|curve| self.0.get(&curve).map_or(&[][..], Vec::as_slice));
+        let ends = shapes.curves[b].ends;
+        of_a.iter().any(|face| of_b.contains(face))
+            && !shapes.curves[a].ends.iter().any(|end| ends.contains(end))
+    }
+
+    /// Whether a place so far from a curve is nearer to one of the others on the other side of a
+    /// face.
+    fn is_beside(
+        &self,
+        shapes: &Shapes,
+        curve: usize,
+        others: &[usize],
+        (place, reach): (&Point, f64),
+    ) -> bool {
+        others.iter().any(|&other| {
+            self.are_apart(shapes, [curve, other])
+                && inner_parameter(&shapes.curves[other], place, reach, 0.0).is_some()
+        })
+    }
+}
+
 /// Crossings this close to another one on the same edge, in tolerances, are there.
 const BESIDE: f64 = 3.0;
 /// Crossings this close to an end, in tolerances, are there.
@@ -47,7 +84,9 @@ impl Pair {
 
 /// Divides the edges of faces at the vertices of others. Returns whether any was divided.
 pub(super) fn divide_at_vertices(shapes: &mut Shapes, pairs: &[Pair], size: f64) -> bool {
-    let mut divisions = Divisions::new();
+    let bounded = Bounded::of(shapes);
+    // Each corner with the curves that it is to divide, and how far away these are.
+    let mut found: BTreeMap<usize, Vec<(f64, usize, f64)>> = BTreeMap::new();
     let mut boxes = Boxes::default();
     for &pair in pairs {
         let own = room(shapes, pair.faces(), size);
@@ -63,8 +102,20 @@ pub(super) fn divide_at_vertices(shapes: &mut Shapes, pairs: &[Pair], size: f64)
                 let point = shapes.corners[corner].point;
                 let is_near = (0..3).all(|axis| low[axis] <= point[axis] && point[axis] <= high[axis]);
                 if let Some(at) = is_near.then(|| inner_parameter(edge, &point, room, room)).flatten() {
-                    divisions.entry(curve).or_default().push((at, corner));
+                    let away = (Point::from(edge.curve.point(at)) - point).norm();
+                    found.entry(corner).or_default().push((away, curve, at));
                 }
+            }
+        }
+    }
+    let mut divisions = Divisions::new();
+    for (corner, mut curves) in found {
+        curves.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut divided: Vec<usize> = Vec::new();
+        for (_, curve, at) in curves {
+            if !divided.iter().any(|&other| bounded.are_apart(shapes, [curve, other])) {
+                divided.push(curve);
+                divisions.entry(curve).or_default().push((at, corner));
             }
         }
     }
@@ -75,9 +126,11 @@ pub(super) fn divide_at_vertices(shapes: &mut Shapes, pairs: &[Pair], size: f64)
 
 /// Divides the edges of faces where they cross each other.
 pub(super) fn divide_at_crossings(shapes: &mut Shapes, pairs: &[Pair], size: f64) {
+    let bounded = Bounded::of(shapes);
     let mut divisions = Divisions::new();
     let mut boxes = Boxes::default();
-    let mut added: Vec<usize> = Vec::new();
+    // The new corners, each with the curves that it is to divide.
+    let mut added: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for &pair in pairs {
         let own = room(shapes, pair.faces(), size);
         let [of_a, of_b] = pair.sides(shapes);
@@ -90,19 +143,32 @@ pub(super) fn divide_at_crossings(shapes: &mut Shapes, pairs: &[Pair], size: f64
                 if !overlap(&boxes.of(shapes, p, room), &boxes.of(shapes, q, room)) {
                     continue;
                 }
-                for (at, point) in crossings(&shapes.curves[p], &shapes.curves[q], room) {
+                for (at, points) in crossings(&shapes.curves[p], &shapes.curves[q], room) {
+                    let reach = (points[1] - points[0]).norm();
+                    let is_beside = [(p, &of_a, points[1]), (q, &of_b, points[0])]
+                        .into_iter()
+                        .any(|(curve, side, there)| bounded.is_beside(shapes, curve, side, (&there, reach)));
+                    if reach > own && is_beside {
+                        continue;
+                    }
+                    let point = nalgebra::center(&points[0], &points[1]);
                     let away = |corner: usize| (shapes.corners[corner].point - point).norm();
                     // Curves of two faces meet their edge where each face is.
                     let there = [p, q].into_iter().filter_map(|curve| divisions.get(&curve)).flatten();
                     let beside = there.map(|known| known.1).filter(|&corner| away(corner) <= BESIDE * room);
-                    let near = added.iter().copied().filter(|&corner| away(corner) <= room);
-                    let known = beside.chain(near).min_by(|&a, &b| away(a).total_cmp(&away(b)));
+                    let near = added.keys().copied().filter(|&corner| away(corner) <= room);
+                    let may_divide = |corner: &usize| {
+                        let divided = added.get(corner).into_iter().flatten();
+                        let mut pairs = divided.flat_map(|&other| [p, q].map(|curve| [curve, other]));
+                        !pairs.any(|pair| bounded.are_apart(shapes, pair))
+                    };
+                    let known = beside.chain(near).filter(may_divide);
+                    let known = known.min_by(|&a, &b| away(a).total_cmp(&away(b)));
                     let corner = known.unwrap_or_else(|| {
                         let body = shapes.faces[pair.faces()[0]].body;
-                        let new = shapes.add_corner(Corner { point, tolerance: room }, body);
-                        added.push(new);
-                        new
+                        shapes.add_corner(Corner { point, tolerance: room }, body)
                     });
+                    added.entry(corner).or_default().extend([p, q]);
                     divisions.entry(p).or_default().push((at[0], corner));
                     divisions.entry(q).or_default().push((at[1], corner));
                 }
@@ -234,8 +300,8 @@ fn polyline(edge: &EdgeCurve) -> Vec<Piece> {
     breaks.windows(2).flat_map(|w| (0..count).map(move |k| piece(w, k))).collect()
 }
 
-/// The parameters and places where two curves cross or touch away from their ends.
-fn crossings(one: &EdgeCurve, other: &EdgeCurve, room: f64) -> Vec<([f64; 2], Point)> {
+/// The parameters where two curves cross or touch away from their ends, and the points of both.
+fn crossings(one: &EdgeCurve, other: &EdgeCurve, room: f64) -> Vec<([f64; 2], [Point; 2])> {
     let [a, b] = [polyline(one), polyline(other)];
     let b: Vec<_> = b.iter().map(|piece| (piece, bounds(std::slice::from_ref(piece), 0.0))).collect();
     let is_at_end = |point: &Point| {
@@ -243,7 +309,7 @@ fn crossings(one: &EdgeCurve, other: &EdgeCurve, room: f64) -> Vec<([f64; 2], Po
             edge.range.iter().any(|&t| (Point::from(edge.curve.point(t)) - point).norm() <= AT_END * room)
         })
     };
-    let mut found: Vec<([f64; 2], Point)> = Vec::new();
+    let mut found: Vec<([f64; 2], [Point; 2])> = Vec::new();
     for p in &a {
         let own = bounds(std::slice::from_ref(p), room);
         for (q, _) in b.iter().filter(|(_, there)| overlap(&own, there)) {
@@ -255,11 +321,11 @@ fn crossings(one: &EdgeCurve, other: &EdgeCurve, room: f64) -> Vec<([f64; 2], Po
                 let between = Point::from(one.curve.point(0.5 * (known + at[0])));
                 (nearest_on_curve(&other.curve, &between).point - between).norm() <= room
             };
-            let is_new = found
-                .iter()
-                .all(|(known, place)| (place - middle).norm() > AT_END * room && !joins(known[0]));
+            let is_new = found.iter().all(|(known, [a, b])| {
+                (nalgebra::center(a, b) - middle).norm() > AT_END * room && !joins(known[0])
+            });
             if (points[1] - points[0]).norm() <= room && !is_at_end(&middle) && is_new {
-                found.push((at, middle));
+                found.push((at, points));
             }
         }
     }
