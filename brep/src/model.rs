@@ -33,6 +33,16 @@ pub struct EdgeCurve {
     pub tolerance: f64,
 }
 
+impl EdgeCurve {
+    /// The parameters between which the curve is smooth, from end to end.
+    pub(crate) fn stops(&self) -> Vec<f64> {
+        let mut stops = vec![self.range[0]];
+        stops.extend(self.curve.breaks(self.range));
+        stops.push(self.range[1]);
+        stops
+    }
+}
+
 /// What a side of a patch lies on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum On {

@@ -13,6 +13,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 type Divisions = BTreeMap<usize, Vec<(f64, usize)>>;
 
 /// The faces that curves bound.
+#[derive(Default)]
 struct Bounded(HashMap<usize, Vec<usize>>);
 
 impl Bounded {
@@ -126,56 +127,68 @@ pub(super) fn divide_at_vertices(shapes: &mut Shapes, pairs: &[Pair], size: f64)
 
 /// Divides the edges of faces where they cross each other.
 pub(super) fn divide_at_crossings(shapes: &mut Shapes, pairs: &[Pair], size: f64) {
-    let bounded = Bounded::of(shapes);
-    let mut divisions = Divisions::new();
+    let mut crossed = Crossed { bounded: Bounded::of(shapes), ..Crossed::default() };
     let mut boxes = Boxes::default();
-    // The new corners, each with the curves that it is to divide.
-    let mut added: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for &pair in pairs {
         let own = room(shapes, pair.faces(), size);
-        let [of_a, of_b] = pair.sides(shapes);
-        let row = Row::new(shapes, &mut boxes, &of_b);
-        for &p in &of_a {
+        let body = shapes.faces[pair.faces()[0]].body;
+        let sides = pair.sides(shapes);
+        let row = Row::new(shapes, &mut boxes, &sides[1]);
+        for &p in &sides[0] {
             let reach = 2.0 * (own + shapes.curves[p].tolerance + row.tolerance);
             let beside = row.beside(&boxes.of(shapes, p, reach));
-            for q in beside.into_iter().map(|k| of_b[k]).filter(|&q| q != p) {
+            for q in beside.into_iter().map(|k| sides[1][k]).filter(|&q| q != p) {
                 let room = own + shapes.curves[p].tolerance + shapes.curves[q].tolerance;
                 if !overlap(&boxes.of(shapes, p, room), &boxes.of(shapes, q, room)) {
                     continue;
                 }
                 for (at, points) in crossings(&shapes.curves[p], &shapes.curves[q], room) {
                     let reach = (points[1] - points[0]).norm();
-                    let is_beside = [(p, &of_a, points[1]), (q, &of_b, points[0])]
-                        .into_iter()
-                        .any(|(curve, side, there)| bounded.is_beside(shapes, curve, side, (&there, reach)));
-                    if reach > own && is_beside {
-                        continue;
-                    }
-                    let point = nalgebra::center(&points[0], &points[1]);
-                    let away = |corner: usize| (shapes.corners[corner].point - point).norm();
-                    // Curves of two faces meet their edge where each face is.
-                    let there = [p, q].into_iter().filter_map(|curve| divisions.get(&curve)).flatten();
-                    let beside = there.map(|known| known.1).filter(|&corner| away(corner) <= BESIDE * room);
-                    let near = added.keys().copied().filter(|&corner| away(corner) <= room);
-                    let may_divide = |corner: &usize| {
-                        let divided = added.get(corner).into_iter().flatten();
-                        let mut pairs = divided.flat_map(|&other| [p, q].map(|curve| [curve, other]));
-                        !pairs.any(|pair| bounded.are_apart(shapes, pair))
+                    let is_beside = |k: usize| {
+                        let place = (&points[1 - k], reach);
+                        crossed.bounded.is_beside(shapes, [p, q][k], &sides[k], place)
                     };
-                    let known = beside.chain(near).filter(may_divide);
-                    let known = known.min_by(|&a, &b| away(a).total_cmp(&away(b)));
-                    let corner = known.unwrap_or_else(|| {
-                        let body = shapes.faces[pair.faces()[0]].body;
-                        shapes.add_corner(Corner { point, tolerance: room }, body)
-                    });
-                    added.entry(corner).or_default().extend([p, q]);
-                    divisions.entry(p).or_default().push((at[0], corner));
-                    divisions.entry(q).or_default().push((at[1], corner));
+                    if reach <= own || !(0..2).any(is_beside) {
+                        let point = nalgebra::center(&points[0], &points[1]);
+                        crossed.add(shapes, body, ([p, q], at), Corner { point, tolerance: room });
+                    }
                 }
             }
         }
     }
-    apply(shapes, divisions, size);
+    apply(shapes, crossed.divisions, size);
+}
+
+/// Where curves cross.
+#[derive(Default)]
+struct Crossed {
+    bounded: Bounded,
+    divisions: Divisions,
+    /// The corners, each with the curves that it is to divide.
+    corners: BTreeMap<usize, Vec<usize>>,
+}
+
+impl Crossed {
+    /// Adds a place where two curves cross: as a corner, or at one that is there.
+    fn add(&mut self, shapes: &mut Shapes, body: usize, (pair, at): ([usize; 2], [f64; 2]), place: Corner) {
+        let away = |corner: usize| (shapes.corners[corner].point - place.point).norm();
+        // Curves of two faces meet their edge where each face is.
+        let there = pair.iter().filter_map(|curve| self.divisions.get(curve)).flatten();
+        let beside = there.map(|known| known.1).filter(|&corner| away(corner) <= BESIDE * place.tolerance);
+        let near = self.corners.keys().copied().filter(|&corner| away(corner) <= place.tolerance);
+        let may_divide = |corner: &usize| {
+            let divided = self.corners.get(corner).into_iter().flatten();
+            let mut pairs = divided.flat_map(|&other| pair.map(|curve| [curve, other]));
+            !pairs.any(|pair| self.bounded.are_apart(shapes, pair))
+        };
+        let known = beside.chain(near).filter(may_divide);
+        let known = known.min_by(|&a, &b| away(a).total_cmp(&away(b)));
+        let corner = known.unwrap_or_else(|| shapes.add_corner(place, body));
+        self.corners.entry(corner).or_default().extend(pair);
+        for (curve, at) in pair.into_iter().zip(at) {
+            self.divisions.entry(curve).or_default().push((at, corner));
+        }
+    }
 }
 
 /// Divides curves, each at one corner only where several are close.
@@ -284,12 +297,10 @@ fn polyline(edge: &EdgeCurve) -> Vec<Piece> {
     /// Pieces of a curve between its breaks.
     const PIECES: usize = 16;
     let at = |t: f64| Point::from(edge.curve.point(t));
-    let mut breaks = vec![edge.range[0]];
-    breaks.extend(edge.curve.breaks(edge.range));
-    breaks.push(edge.range[1]);
+    let stops = edge.stops();
     let count = match edge.curve {
         crate::Curve::Line { .. } => 1,
-        _ => PIECES.div_ceil(breaks.len() - 1).max(4),
+        _ => PIECES.div_ceil(stops.len() - 1).max(4),
     };
     let piece = |w: &[f64], k: usize| {
         let range = [k, k + 1].map(|k| w[0] + (w[1] - w[0]) * k as f64 / count as f64);
@@ -297,7 +308,7 @@ fn polyline(edge: &EdgeCurve) -> Vec<Piece> {
         let sag = (at(0.5 * (range[0] + range[1])) - nalgebra::center(&ends[0], &ends[1])).norm();
         Piece { range, ends, sag }
     };
-    breaks.windows(2).flat_map(|w| (0..count).map(move |k| piece(w, k))).collect()
+    stops.windows(2).flat_map(|w| (0..count).map(move |k| piece(w, k))).collect()
 }
 
 /// The parameters where two curves cross or touch away from their ends, and the points of both.

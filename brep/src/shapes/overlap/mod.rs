@@ -49,6 +49,14 @@ pub(crate) enum Care {
     High,
 }
 
+/// What faces that cross are searched with.
+struct Search<'a> {
+    care: Care,
+    facets: &'a Facets,
+    tessellation: &'a Tessellation,
+    size: f64,
+}
+
 /// What was cut.
 #[derive(Default)]
 pub(crate) struct Cuts {
@@ -90,7 +98,8 @@ impl Shapes {
         }
         let contacts = imprint::contacts(self, size);
         self.orient_planes(size);
-        let crossings = self.crossings(care, &facets, tessellation, &contacts, size);
+        let search = Search { care, facets: &facets, tessellation, size };
+        let crossings = self.crossings(&search, &contacts);
         let crossed: Vec<[usize; 2]> =
             crossings.iter().filter(|one| !one.added.is_empty()).map(|one| one.faces).collect();
         crossings.into_iter().for_each(|crossing| self.add_crossing(crossing, size));
@@ -113,14 +122,8 @@ impl Shapes {
     }
 
     /// Where faces of different bodies cross that have not the same surface.
-    fn crossings(
-        &self,
-        care: Care,
-        facets: &Facets,
-        tessellation: &Tessellation,
-        contacts: &[[usize; 2]],
-        size: f64,
-    ) -> Vec<Crossing> {
+    fn crossings(&self, search: &Search, contacts: &[[usize; 2]]) -> Vec<Crossing> {
+        let Search { facets, size, .. } = *search;
         let touch: HashSet<[usize; 2]> = contacts.iter().copied().collect();
         let patch = |face: usize| self.faces[face].id as usize - 1;
         let mut order: Vec<usize> = (0..self.faces.len()).collect();
@@ -139,21 +142,16 @@ impl Shapes {
         };
         let mut pairs: Vec<[usize; 2]> = (0..order.len()).into_par_iter().flat_map_iter(beside).collect();
         pairs.sort_unstable();
-        let cross = |faces: &[usize; 2]| self.crossing(care, facets, tessellation, *faces, size);
+        let cross = |faces: &[usize; 2]| self.crossing(search, *faces);
         pairs.par_iter().map(cross).collect()
     }
 
-    fn crossing(
-        &self,
-        care: Care,
-        facets: &Facets,
-        tessellation: &Tessellation,
-        faces: [usize; 2],
-        size: f64,
-    ) -> Crossing {
+    /// What two faces have in common.
+    fn crossing(&self, search: &Search, faces: [usize; 2]) -> Crossing {
+        let Search { care, facets, size, .. } = *search;
         let patches = faces.map(|face| self.faces[face].id as usize - 1);
         let room = imprint::room(self, faces, size);
-        let near = [0, 1].map(|k| self.near_curves(facets, tessellation, [faces[k], patches[1 - k]], size));
+        let near = [0, 1].map(|k| self.near_curves(search, faces[k], patches[1 - k]));
         let on = [0, 1].map(|k| {
             let surface = &self.faces[faces[1 - k]].surface;
             let lies_on = |curve: &usize| imprint::lies_on(surface, &self.curves[*curve], room);
@@ -173,13 +171,8 @@ impl Shapes {
     }
 
     /// The curves of a face that are near a patch.
-    fn near_curves(
-        &self,
-        facets: &Facets,
-        tessellation: &Tessellation,
-        [face, patch]: [usize; 2],
-        size: f64,
-    ) -> Vec<usize> {
+    fn near_curves(&self, search: &Search, face: usize, patch: usize) -> Vec<usize> {
+        let Search { facets, tessellation, size, .. } = *search;
         let is_near = |curve: &usize| {
             let points = tessellation.lines[*curve].iter().map(|on| tessellation.points[on.0 as usize]);
             facets.is_near(patch, points, ROOM * size)

@@ -14,14 +14,11 @@ const HALVINGS: usize = 40;
 
 /// The points at which an edge passes through a surface, with the surface's parameters there.
 pub(super) fn passes(surface: &Surface, edge: &EdgeCurve) -> Vec<(Point, [f64; 2])> {
-    let mut places = vec![edge.range[0]];
-    places.extend(edge.curve.breaks(edge.range));
-    places.push(edge.range[1]);
     let within = |w: &[f64]| {
         let [from, to] = [w[0], w[1]];
         (0..PIECES).map(move |k| from + (to - from) * k as f64 / PIECES as f64)
     };
-    let mut all: Vec<f64> = places.windows(2).flat_map(within).collect();
+    let mut all: Vec<f64> = edge.stops().windows(2).flat_map(within).collect();
     all.push(edge.range[1]);
     let mut feet: Vec<Foot> = Vec::with_capacity(all.len());
     for &t in &all {
