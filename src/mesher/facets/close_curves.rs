@@ -5,7 +5,7 @@ use super::{BluntEnd, FacetCurve, FacetModel};
 use crate::Point;
 use crate::ground::kernel::tree::{Tree, bounds};
 use crate::ground::projector::FacetProjector;
-use crate::ground::size::{SizeSettings, Source, Sources, thinned};
+use crate::ground::size::{SizeSettings, Source, Sources};
 use crate::mesher::surface::closeness::lowered;
 use csg::{CurveId, PatchId};
 use rayon::prelude::*;
@@ -40,7 +40,7 @@ pub(super) fn sample(model: &FacetModel, settings: &SizeSettings, maximum: f64, 
         return;
     }
     let curves = Curves::new(model);
-    let alone = Sources::new(settings.grading, maximum, &thinned(sources.clone()));
+    let alone = Sources::new(settings.grading, maximum, sources);
     let across = ACROSS * settings.scale.min(1.0);
     let of_curve = |related: &mut Vec<bool>, c: usize| {
         let mut added = Vec::new();

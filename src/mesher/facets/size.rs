@@ -4,13 +4,14 @@
 //! patch's normal per length (compare Rusinkiewicz 2004, who fits a tensor to these). Slivers are
 //! ignored, because their neighbours cover the same area.
 
-use super::{FacetCurve, FacetModel, close_curves};
+use super::{BluntEnd, FacetCurve, FacetModel, close_curves};
 use crate::ground::kernel::simplex::area_vector;
 use crate::ground::projector::facets::normals::SLIVER_HEIGHT;
 use crate::ground::size::{
     Closeness, Evaluation, GradedSize, SizeField, SizeFunction, SizeSettings, Source, thinned,
 };
 use crate::{Point, Vector};
+use rayon::prelude::*;
 
 /// Sizes from the curvature of facets and curves, from short curves, and from the user's settings.
 #[derive(Clone, Debug)]
@@ -41,6 +42,7 @@ impl FacetSize {
         let mut sources = settings.sources.clone();
         sample_facets(model, settings, maximum, &mut sources);
         sample_curves(model, settings, maximum, &mut sources);
+        let mut sources = thinned(sources);
         close_curves::sample(model, settings, maximum, &mut sources);
         let graded = GradedSize::new(model.bounds, settings.grading, maximum, &thinned(sources), evaluation);
         Self { graded, function: settings.function.clone() }
@@ -97,26 +99,34 @@ fn size_of_curvature(settings: &SizeSettings, curvature: f64) -> f64 {
 
 /// Adds sources on facets whose curvature needs a size below `maximum`.
 fn sample_facets(model: &FacetModel, settings: &SizeSettings, maximum: f64, sources: &mut Vec<Source>) {
-    for (patch, corners, normals) in model.projector.facets() {
-        if model.blunt.iter().any(|end| end.patch == patch && end.has(corners)) {
-            continue;
+    let of_piece = |(patch, facets, normals): (usize, &[[Point; 3]], &[[Vector; 3]])| {
+        let blunt: Vec<&BluntEnd> = model.blunt.iter().filter(|end| end.patch == patch).collect();
+        let mut added = Vec::new();
+        for (corners, normals) in facets.iter().zip(normals) {
+            let size = size_of_curvature(settings, curvature(corners, normals, model.rounding));
+            if size < maximum && !blunt.iter().any(|end| end.has(corners)) {
+                sample_facet(corners, size, &mut added);
+            }
         }
-        let size = size_of_curvature(settings, curvature(corners, normals, model.rounding));
-        if size >= maximum {
-            continue;
-        }
-        // In rows parallel to the longest side.
-        let length = |k: usize| (corners[(k + 2) % 3] - corners[(k + 1) % 3]).norm();
-        let k = (0..3).max_by(|&i, &j| length(i).total_cmp(&length(j))).unwrap_or(0);
-        let [apex, from, to] = [0, 1, 2].map(|i| corners[(k + i) % 3]);
-        let rows = intervals((apex - from).norm().min((apex - to).norm()), size);
-        for row in 0..=rows {
-            let up = row as f64 / rows as f64;
-            let [a, b] = [from, to].map(|p| p + (apex - p) * up);
-            let columns = intervals((b - a).norm(), size);
-            let on = |column: usize| a + (b - a) * (column as f64 / columns as f64);
-            sources.extend((0..=columns).map(|column| Source { point: on(column), size }));
-        }
+        added
+    };
+    let pieces: Vec<_> = model.projector.facets().collect();
+    let added: Vec<Vec<Source>> = pieces.into_par_iter().map(of_piece).collect();
+    sources.extend(added.concat());
+}
+
+/// Adds sources on a facet, in rows parallel to its longest side.
+fn sample_facet(corners: &[Point; 3], size: f64, sources: &mut Vec<Source>) {
+    let length = |k: usize| (corners[(k + 2) % 3] - corners[(k + 1) % 3]).norm();
+    let k = (0..3).max_by(|&i, &j| length(i).total_cmp(&length(j))).unwrap_or(0);
+    let [apex, from, to] = [0, 1, 2].map(|i| corners[(k + i) % 3]);
+    let rows = intervals((apex - from).norm().min((apex - to).norm()), size);
+    for row in 0..=rows {
+        let up = row as f64 / rows as f64;
+        let [a, b] = [from, to].map(|p| p + (apex - p) * up);
+        let columns = intervals((b - a).norm(), size);
+        let on = |column: usize| a + (b - a) * (column as f64 / columns as f64);
+        sources.extend((0..=columns).map(|column| Source { point: on(column), size }));
     }
 }
 

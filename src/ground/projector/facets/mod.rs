@@ -239,10 +239,13 @@ impl FacetProjector {
         self.source.tips.iter().any(|&v| self.source.points[v as usize] == *point)
     }
 
-    /// All facets, each with the index of its patch and the normals of the patch at their corners.
-    pub(crate) fn facets(&self) -> impl Iterator<Item = (usize, &[Point; 3], &[Vector; 3])> {
+    /// The facets in pieces of one patch each, with the normals of the patch at their corners.
+    pub(crate) fn facets(&self) -> impl Iterator<Item = (usize, &[[Point; 3]], &[[Vector; 3]])> {
+        /// Facets of a piece, at most.
+        const MOST: usize = 4096;
         self.patches.iter().enumerate().flat_map(|(patch, of)| {
-            of.facets.iter().zip(&of.normals).map(move |(corners, normals)| (patch, corners, normals))
+            let pieces = of.facets.chunks(MOST).zip(of.normals.chunks(MOST));
+            pieces.map(move |(facets, normals)| (patch, facets, normals))
         })
     }
 
