@@ -454,6 +454,24 @@ fn cut_and_damaged_files_give_errors_or_models_but_no_panic() {
 }
 
 #[test]
+fn a_vertex_far_away_from_its_edge_is_refused_however_far() {
+    let text = String::from_utf8(file("thick_cylinder")).unwrap();
+    let coarse = Settings { chord: 0.05, angle: 1.0 };
+    for far in ["1e2", "1e30"] {
+        // The first vertex: its tolerance and three coordinates follow.
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        let vertex = lines.iter().position(|line| line == "Ve").unwrap();
+        let mut place: Vec<&str> = lines[vertex + 2].split(' ').collect();
+        place[1] = far;
+        lines[vertex + 2] = place.join(" ");
+        let refused = Model::read(lines.join("\n").as_bytes())
+            .and_then(|mut model| Tessellation::of(&mut model, &coarse))
+            .expect_err("a vertex off its edge");
+        assert!(refused.to_string().contains("a vertex of edge 1 is "), "{far}: {refused}");
+    }
+}
+
+#[test]
 fn huge_numbers_give_errors_or_models_but_no_panic() {
     let coarse = Settings { chord: 0.05, angle: 1.0 };
     let read =

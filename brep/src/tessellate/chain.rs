@@ -3,7 +3,7 @@
 use super::Tessellation;
 use super::cross::cut;
 use super::face::Tolerances;
-use crate::model::{Corner, EdgeCurve, Fin, Model, On, Patch};
+use crate::model::{AWAY, Corner, EdgeCurve, Fin, Model, On, Patch};
 use crate::project::project_to_surface;
 use crate::{BrepError, Point, Surface};
 
@@ -157,7 +157,12 @@ fn on_curve(
             let what = format!("edge {} is {gap:.3e} away from it", curve + 1);
             return Err(BrepError::face(number, what, Some(on)));
         }
-        most_gap = most_gap.max(gap).max((surface.point(parameters) - out.points[vertex as usize]).norm());
+        let off = (surface.point(parameters) - out.points[vertex as usize]).norm();
+        if off > AWAY * tolerances.diagonal {
+            let what = format!("a vertex of edge {} is {off:.3e} away from it", curve + 1);
+            return Err(BrepError::face(number, what, Some(on)));
+        }
+        most_gap = most_gap.max(gap).max(off);
         side.push((parameters, vertex));
     }
     if fin.curve.is_some() {

@@ -188,12 +188,22 @@ fn normal(edge: &EdgeCurve, (surface, fin): Beside, t: f64) -> Option<Vector> {
 }
 
 /// The diagonal of the box around corners, samples of curves and other points; not 0.
+///
+/// Corners so far from all else that no part of the model reaches there are faults of the file.
 pub(crate) fn diagonal(corners: &[Corner], curves: &[EdgeCurve], others: Vec<Point>) -> f64 {
     let mut points = others;
-    points.extend(corners.iter().map(|c| c.point));
     for edge in curves {
         let [low, high] = edge.range;
         points.extend((1..8).map(|k| Point::from(edge.curve.point(low + (high - low) * f64::from(k) / 8.0))));
+    }
+    if let Some(first) = points.first() {
+        let (mut low, mut high) = (*first, *first);
+        points.iter().for_each(|p| (low, high) = (low.inf(p), high.sup(p)));
+        let reach = (high - low).norm();
+        let is_near = |p: &Point| (0..3).all(|i| low[i] - reach <= p[i] && p[i] <= high[i] + reach);
+        points.extend(corners.iter().map(|corner| corner.point).filter(is_near));
+    } else {
+        points.extend(corners.iter().map(|corner| corner.point));
     }
     let bound =
         |worst: f64, pick: fn(f64, f64) -> f64, axis: usize| points.iter().map(|p| p[axis]).fold(worst, pick);
