@@ -196,20 +196,23 @@ pub(crate) fn diagonal(corners: &[Corner], curves: &[EdgeCurve], others: Vec<Poi
         let [low, high] = edge.range;
         points.extend((1..8).map(|k| Point::from(edge.curve.point(low + (high - low) * f64::from(k) / 8.0))));
     }
-    if let Some(first) = points.first() {
-        let (mut low, mut high) = (*first, *first);
-        points.iter().for_each(|p| (low, high) = (low.inf(p), high.sup(p)));
-        let reach = (high - low).norm();
-        let is_near = |p: &Point| (0..3).all(|i| low[i] - reach <= p[i] && p[i] <= high[i] + reach);
-        points.extend(corners.iter().map(|corner| corner.point).filter(is_near));
-    } else {
-        points.extend(corners.iter().map(|corner| corner.point));
-    }
-    let bound =
-        |worst: f64, pick: fn(f64, f64) -> f64, axis: usize| points.iter().map(|p| p[axis]).fold(worst, pick);
-    let extent = |axis| bound(f64::NEG_INFINITY, f64::max, axis) - bound(f64::INFINITY, f64::min, axis);
-    let squared: f64 = (0..3).map(|axis| extent(axis) * extent(axis)).sum();
-    squared.sqrt().max(f64::MIN_POSITIVE)
+    let extents = |points: &[Point]| {
+        let of_axis = |axis: usize| {
+            let widen = |[low, high]: [f64; 2], p: &Point| [low.min(p[axis]), high.max(p[axis])];
+            points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], widen)
+        };
+        [0, 1, 2].map(of_axis)
+    };
+    let length = |extents: &[[f64; 2]; 3]| {
+        extents.iter().map(|[low, high]| (high - low) * (high - low)).sum::<f64>().sqrt()
+    };
+    let around = extents(&points);
+    let (is_first, reach) = (points.is_empty(), length(&around));
+    let is_near = |p: &Point| {
+        (0..3).all(|axis| around[axis][0] - reach <= p[axis] && p[axis] <= around[axis][1] + reach)
+    };
+    points.extend(corners.iter().map(|corner| corner.point).filter(|p| is_first || is_near(p)));
+    length(&extents(&points)).max(f64::MIN_POSITIVE)
 }
 
 #[cfg(test)]

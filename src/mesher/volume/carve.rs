@@ -30,7 +30,9 @@ pub(super) fn carve(
     regions: &[[Option<BodyId>; 2]],
     far: u32,
 ) -> Result<(), Disagreement> {
-    let assigned = assigned(mesh, constraints, regions);
+    let locked = mesh.half_faces().filter(|&half_face| mesh.is_locked(half_face));
+    let assign = |half_face| (half_face >> 2, triangle_and_region(mesh, constraints, regions, half_face));
+    let assigned: Vec<_> = locked.map(assign).collect();
     let mut open = Vec::new();
     flood(mesh, mesh.at_vertex[far as usize], OUTSIDE, &mut open);
     for (t, (triangle, region)) in assigned {
@@ -44,20 +46,6 @@ pub(super) fn carve(
     }
     remove_outside(mesh);
     Ok(())
-}
-
-/// For each locked half-face its tet, its triangle, and the region that it assigns to the tet.
-fn assigned(
-    mesh: &Tetrahedra,
-    constraints: &Constraints,
-    regions: &[[Option<BodyId>; 2]],
-) -> Vec<(u32, (u32, Option<BodyId>))> {
-    let of_tet = |t: u32| {
-        let half_faces = if mesh.is_alive(t) { 4 * t..4 * t + 4 } else { 0..0 };
-        let locked = half_faces.filter(|&half_face| mesh.is_locked(half_face));
-        locked.map(move |half_face| (t, triangle_and_region(mesh, constraints, regions, half_face)))
-    };
-    (0..mesh.tets.len() as u32).into_par_iter().flat_map_iter(of_tet).collect()
 }
 
 fn label(region: Option<BodyId>) -> u32 {

@@ -91,12 +91,8 @@ impl Constraints {
 
     /// The faces of a mesh that are facets: from one side each, with the facet, ascending.
     pub fn faces_in(&self, mesh: &Tetrahedra) -> Vec<(u32, u32)> {
-        let of_tet = |t: u32| {
-            let half_faces = if mesh.is_alive(t) { 4 * t..4 * t + 4 } else { 0..0 };
-            let once = half_faces.filter(|&h| h < mesh.across(h));
-            once.filter_map(|h| Some((h, self.facet(mesh.face(h))?)))
-        };
-        (0..mesh.tets.len() as u32).into_par_iter().flat_map_iter(of_tet).collect()
+        let once = mesh.half_faces().filter(|&h| h < mesh.across(h));
+        once.filter_map(|h| Some((h, self.facet(mesh.face(h))?))).collect()
     }
 
     /// Whether these are the ends of an edge of a facet.

@@ -68,6 +68,12 @@ impl Tetrahedra {
         (0..self.tets.len() as u32).filter(|&t| self.is_alive(t))
     }
 
+    /// The half-faces of all tets, in ascending order if collected.
+    pub fn half_faces(&self) -> impl ParallelIterator<Item = u32> + '_ {
+        let slots = (0..self.tets.len() as u32).into_par_iter();
+        slots.filter(|&t| self.is_alive(t)).flat_map_iter(|t| 4 * t..4 * t + 4)
+    }
+
     /// The number of tets.
     pub fn len(&self) -> usize {
         self.tets.len() - self.free.len()
