@@ -6,8 +6,8 @@
 use super::cut::middle;
 use super::diagonal;
 use super::lattice::{Lattice, OCTAHEDRON, UPRIGHT, UPSIDE_DOWN};
+use super::rows::Rows;
 use super::snap::Coordinates;
-use super::tet::Plan;
 use crate::Point;
 use crate::ground::kernel::jacobian::{self, Nodes};
 use crate::ground::kernel::predicates::{Sign, orient3d};
@@ -33,13 +33,13 @@ pub(super) const fn steps(corners: [u8; 4]) -> Steps {
 }
 
 /// Copies the corners of the children out of the lattice of nodes.
-pub(super) fn take_corners(nodes: &[Vec<f64>; 3], plan: &Plan, cells: &Plan, corners: &mut [Vec<f64>; 3]) {
-    let n = cells.lattice.n();
+pub(super) fn take_corners(nodes: &[Vec<f64>; 3], rows: &Rows, cells: &Rows, corners: &mut [Vec<f64>; 3]) {
+    let n = cells.lattice().n();
     for (nodes, corners) in nodes.iter().zip(corners) {
         corners.clear();
         for d in 0..=n {
             for c in 0..=n - d {
-                let row = &nodes[plan.row(2 * c, 2 * d)..][..=2 * (n - c - d) as usize];
+                let row = &nodes[rows.start(2 * c, 2 * d)..][..=2 * (n - c - d) as usize];
                 corners.extend(row.iter().step_by(2));
             }
         }
@@ -50,14 +50,14 @@ pub(super) fn take_corners(nodes: &[Vec<f64>; 3], plan: &Plan, cells: &Plan, cor
 /// octahedron unless `nested`.
 pub(super) fn prove(
     axes: &[Vec<f64>; 3],
-    plan: &Plan,
+    rows: &Rows,
     cells: Lattice,
     nested: bool,
     diagonals: &mut [u8],
     bad: &mut Vec<(u32, Coordinates)>,
 ) {
     for (c, d, count) in cells.rows() {
-        let nodes = |cell: u32, corners: [u8; 4]| nodes_at(axes, plan, [cell, c, d], &steps(corners));
+        let nodes = |cell: u32, corners: [u8; 4]| nodes_at(axes, rows, [cell, c, d], &steps(corners));
         let mut check = |child: u32, nodes: &Nodes| {
             if !is_proved(nodes) {
                 bad.push((child, middle(&corners(nodes))));
@@ -93,10 +93,10 @@ pub(super) fn prove(
 }
 
 /// The nodes of a child in a cell.
-fn nodes_at(axes: &[Vec<f64>; 3], plan: &Plan, [b, c, d]: [u32; 3], steps: &Steps) -> Nodes {
+fn nodes_at(axes: &[Vec<f64>; 3], rows: &Rows, [b, c, d]: [u32; 3], steps: &Steps) -> Nodes {
     steps.map(|step| {
         let [b, c, d] = [2 * b + u32::from(step[0]), 2 * c + u32::from(step[1]), 2 * d + u32::from(step[2])];
-        let at = plan.row(c, d) + b as usize;
+        let at = rows.start(c, d) + b as usize;
         [axes[0][at], axes[1][at], axes[2][at]]
     })
 }

@@ -4,9 +4,10 @@
 
 use super::diagonal;
 use super::lattice::{Lattice, OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place};
+use super::rows::Rows;
 use super::run::Run;
 use super::snap::Coordinates;
-use super::tet::{BadTet, Plan};
+use super::tet::BadTet;
 use crate::Point;
 use crate::ground::kernel::predicates::{Sign, orient3d};
 use crate::ground::kernel::vector::{Wide, wide};
@@ -45,36 +46,38 @@ impl Cutting {
     }
 
     /// Cuts the octahedra, checks the children, and notes those that are not positive.
-    pub fn cut(&mut self, plan: &Plan, cut: Cut, bytes: &mut [u8]) {
+    pub fn cut(&mut self, rows: &Rows, cut: Cut, bytes: &mut [u8]) {
         self.bad.clear();
-        wide(CutAll { cutting: self, plan, cut, bytes });
+        wide(CutAll { cutting: self, rows, cut, bytes });
     }
 
     /// Cuts all octahedra along one diagonal and checks the children.
     #[inline(always)]
-    fn cut_evenly(&mut self, plan: &Plan, diagonal: u8, bytes: &mut [u8]) {
+    fn cut_evenly(&mut self, rows: &Rows, diagonal: u8, bytes: &mut [u8]) {
         // Four octahedra per byte; bits beyond the last octahedron are never read.
         bytes.fill(diagonal * 0b0101_0101);
-        for (c, d, cells) in plan.lattice.rows() {
-            let rows = plan.around(c, d);
-            self.check_others(plan, rows, [c, d, cells]);
-            let first = plan.lattice.octahedron_child([0, c, d]);
+        let lattice = rows.lattice();
+        for (c, d, cells) in lattice.rows() {
+            let around = rows.around(c, d);
+            self.check_others(lattice, around, [c, d, cells]);
+            let first = lattice.octahedron_child([0, c, d]);
             for (child, corners) in (0..).zip(OCTAHEDRON[usize::from(diagonal)]) {
-                self.check_run(rows, corners, cells - 1, first + child, 4);
+                self.check_run(around, corners, cells - 1, first + child, 4);
             }
         }
     }
 
     /// Cuts each octahedron along its own best diagonal and checks the children.
     #[inline(always)]
-    fn cut_each_best(&mut self, plan: &Plan, bytes: &mut [u8]) {
-        for (c, d, cells) in plan.lattice.rows() {
-            let rows = plan.around(c, d);
-            self.check_others(plan, rows, [c, d, cells]);
+    fn cut_each_best(&mut self, rows: &Rows, bytes: &mut [u8]) {
+        let lattice = rows.lattice();
+        for (c, d, cells) in lattice.rows() {
+            let around = rows.around(c, d);
+            self.check_others(lattice, around, [c, d, cells]);
             let count = cells as usize - 1;
-            self.measure_octahedra(rows, count);
-            let first_child = plan.lattice.octahedron_child([0, c, d]);
-            let first = plan.lattice.octahedron_row(c, d);
+            self.measure_octahedra(around, count);
+            let first_child = lattice.octahedron_child([0, c, d]);
+            let first = lattice.octahedron_row(c, d);
             for i in 0..count {
                 let best = diagonal::best([0, 1, 2].map(|k| self.shapes[k][i]));
                 diagonal::set(bytes, first + i as u32, best);
@@ -82,7 +85,7 @@ impl Cutting {
                     continue;
                 }
                 for (child, corners) in (0..).zip(OCTAHEDRON[usize::from(best)]) {
-                    self.check_one(rows, corners, i, first_child + 4 * i as u32 + child);
+                    self.check_one(around, corners, i, first_child + 4 * i as u32 + child);
                 }
             }
         }
@@ -90,8 +93,8 @@ impl Cutting {
 
     /// Checks the upright and upside-down children of a row of cells.
     #[inline(always)]
-    fn check_others(&mut self, plan: &Plan, rows: [usize; 4], [c, d, cells]: [u32; 3]) {
-        let first = plan.lattice.child_row(c, d);
+    fn check_others(&mut self, lattice: Lattice, rows: [usize; 4], [c, d, cells]: [u32; 3]) {
+        let first = lattice.child_row(c, d);
         self.check_run(rows, UPRIGHT, cells, first, 1);
         let first = first + cells + 4 * (cells - 1);
         self.check_run(rows, UPSIDE_DOWN, cells.saturating_sub(2), first, 1);
@@ -186,7 +189,7 @@ pub(super) fn middle([p, q, r, s]: &[Point; 4]) -> Coordinates {
 /// Cuts the octahedra with wide registers.
 struct CutAll<'a> {
     cutting: &'a mut Cutting,
-    plan: &'a Plan,
+    rows: &'a Rows,
     cut: Cut,
     bytes: &'a mut [u8],
 }
@@ -196,10 +199,10 @@ impl Wide for CutAll<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { cutting, plan, cut, bytes } = self;
+        let Self { cutting, rows, cut, bytes } = self;
         match cut {
-            Cut::Evenly(diagonal) => cutting.cut_evenly(plan, diagonal, bytes),
-            Cut::EachBest => cutting.cut_each_best(plan, bytes),
+            Cut::Evenly(diagonal) => cutting.cut_evenly(rows, diagonal, bytes),
+            Cut::EachBest => cutting.cut_each_best(rows, bytes),
         }
     }
 }

@@ -43,7 +43,7 @@ pub const OCTAHEDRON: [[[u8; 4]; 4]; 3] = [
 ];
 
 /// The unit step of (b, c, d) toward each corner of the tet.
-const STEP: [[u32; 3]; 4] = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
+pub(super) const STEP: [[u32; 3]; 4] = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
 
 /// The lattice with a given number of subdivisions per edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -159,19 +159,6 @@ impl Lattice {
         (0..n).flat_map(move |d| (0..n - d).map(move |c| (c, d, n - d - c)))
     }
 
-    /// The index of the point at position `k` of the edge from corner `from` to corner `to`.
-    pub fn on_edge(self, [from, to]: [usize; 2], k: u32) -> u32 {
-        self.index([0, 1, 2].map(|x| (self.n - k) * STEP[from][x] + k * STEP[to][x]))
-    }
-
-    /// The index of the point of a face with weights `j` and `k` at its second and third corner.
-    #[inline]
-    pub fn on_face(self, [p, q, r]: [usize; 3], j: u32, k: u32) -> u32 {
-        let i = self.n - j - k;
-        let step = |x: usize| i * STEP[p][x] + j * STEP[q][x] + k * STEP[r][x];
-        self.index([step(0), step(1), step(2)])
-    }
-
     /// The interior points (j, k) of a face in order, k outermost.
     pub fn face_interior(self) -> impl Iterator<Item = (u32, u32)> {
         let n = self.n;
@@ -281,25 +268,6 @@ mod tests {
             assert_eq!(lattice.face_interior().count() as u32, lattice.face_points());
             assert_eq!(lattice.interior_rows().map(|r| r.1).sum::<u32>(), lattice.tet_points());
         }
-    }
-
-    #[test]
-    fn points_inside_edges_faces_and_the_tet_cover_the_lattice_once() {
-        let lattice = Lattice::new(7);
-        let mut seen = vec![0; lattice.points() as usize];
-        for k in 0..4 {
-            seen[lattice.index(STEP[k].map(|x| x * 7)) as usize] += 1;
-        }
-        for edge in crate::ground::mesh::TET_EDGES {
-            (1..7).for_each(|k| seen[lattice.on_edge(edge, k) as usize] += 1);
-        }
-        for face in TET_FACES {
-            lattice.face_interior().for_each(|(j, k)| seen[lattice.on_face(face, j, k) as usize] += 1);
-        }
-        for (first, count) in lattice.interior_rows() {
-            (first..first + count).for_each(|i| seen[i as usize] += 1);
-        }
-        assert!(seen.iter().all(|&times| times == 1), "{seen:?}");
     }
 
     #[test]

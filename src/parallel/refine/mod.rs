@@ -30,6 +30,7 @@ pub mod periodic;
 mod periodic_check;
 pub mod predicted;
 pub mod refined;
+mod rows;
 mod run;
 pub mod snap;
 pub mod stored;

@@ -12,6 +12,7 @@
 //! tet by the order of its vertices. So all ranks that share an entity agree without messages.
 
 use super::lattice::{Lattice, for_each_face_child};
+use super::rows::Rows;
 use super::{RefineError, possible_pieces};
 use crate::ground::kernel::simplex::from_lowest;
 use crate::ground::mesh::stream::Counts;
@@ -20,6 +21,7 @@ use crate::ground::mesh::{
 };
 use crate::parallel::distribution::{DistMesh, Totals};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// One dimension of coarse entities, and the number of fine vertices interior to each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,9 +40,9 @@ struct Kind {
 #[derive(Clone, Debug)]
 pub struct Numbering {
     /// The lattice of the tets.
-    cells: Lattice,
+    cells: Arc<Rows>,
     /// The lattice of the vertices: finer for second order.
-    lattice: Lattice,
+    lattice: Arc<Rows>,
     /// By dimension: vertices, edges, faces, tets.
     kinds: [Kind; 4],
     /// The number of local vertices.
@@ -134,22 +136,33 @@ impl Numbering {
             global += all[dimension] * u64::from(kind.size);
             kind
         });
+        let [cells, lattice] = [cells, lattice].map(|lattice| Arc::new(Rows::new(lattice)));
         Ok(Self { cells, lattice, kinds, vertices: local, totals: fine_totals(&mesh.totals, n, order) })
     }
 
     /// The lattice of the tets.
     pub fn cells(&self) -> Lattice {
-        self.cells
+        self.cells.lattice()
+    }
+
+    /// The rows of points of the lattice of the tets.
+    pub(super) fn cell_rows(&self) -> &Rows {
+        &self.cells
     }
 
     /// The order of the elements.
     pub fn order(&self) -> Order {
-        if self.cells == self.lattice { Order::First } else { Order::Second }
+        if self.cells() == self.lattice() { Order::First } else { Order::Second }
     }
 
     /// The lattice of the vertices.
     pub fn lattice(&self) -> Lattice {
-        self.lattice
+        self.lattice.lattice()
+    }
+
+    /// The rows of points of the lattice of the vertices.
+    pub(super) fn rows(&self) -> &Rows {
+        &self.lattice
     }
 
     /// The number of fine vertices of this part.
@@ -242,13 +255,13 @@ impl Numbering {
 
     /// Local ids of all lattice points of a tet, in the order of [`Lattice`].
     pub fn lattice_ids(&self, mesh: &DistMesh, tet: TetId, ids: &mut Vec<u32>) {
-        let lattice = self.lattice;
+        let (rows, lattice) = (self.rows(), self.lattice());
         let n = lattice.n();
         let corners = mesh.tets[tet.index()];
         ids.clear();
         ids.resize(lattice.points() as usize, 0);
         for (corner, at) in [[0, 0, 0], [n, 0, 0], [0, n, 0], [0, 0, n]].into_iter().enumerate() {
-            ids[lattice.index(at) as usize] = corners[corner].0;
+            ids[rows.index(at)] = corners[corner].0;
         }
         if n == 1 {
             return;
@@ -257,14 +270,14 @@ impl Numbering {
             let edge = ascending(edge, |corner| corners[corner].0);
             let inside = self.inside(Entity { dimension: 1, id: id.0 });
             for (vertex, k) in inside.zip(1..) {
-                ids[lattice.on_edge(edge, k) as usize] = vertex;
+                ids[rows.on_edge(edge, k)] = vertex;
             }
         }
         for (face, id) in TET_FACES.into_iter().zip(mesh.tet_faces[tet.index()]) {
             let face = ascending(face, |corner| corners[corner].0);
             let inside = self.inside(Entity { dimension: 2, id: id.0 });
             for (vertex, (j, k)) in inside.zip(lattice.face_interior()) {
-                ids[lattice.on_face(face, j, k) as usize] = vertex;
+                ids[rows.on_face(face, j, k)] = vertex;
             }
         }
         let mut next = self.inside(Entity { dimension: 3, id: tet.0 }).start;
@@ -279,7 +292,7 @@ impl Numbering {
     /// Local ids of all lattice points of a face of a tet, by j + (n + 1)·k. `corners` are the
     /// local numbers of the face's vertices in the tet, by ascending vertex.
     pub fn face_ids(&self, mesh: &DistMesh, tet: TetId, corners: [usize; 3]) -> Vec<u32> {
-        let n = self.lattice.n();
+        let n = self.lattice().n();
         let vertices = mesh.tets[tet.index()];
         let at = |j: u32, k: u32| (j + (n + 1) * k) as usize;
         let mut ids = vec![u32::MAX; at(n, n) + 1];
@@ -304,7 +317,7 @@ impl Numbering {
         let opposite = 6 - corners.iter().sum::<usize>();
         let face = mesh.tet_faces[tet.index()][opposite];
         let inside = self.inside(Entity { dimension: 2, id: face.0 });
-        for (vertex, (j, k)) in inside.zip(self.lattice.face_interior()) {
+        for (vertex, (j, k)) in inside.zip(self.lattice().face_interior()) {
             ids[at(j, k)] = vertex;
         }
         ids
@@ -321,12 +334,12 @@ impl Numbering {
         face: usize,
         mut each: impl FnMut([u32; 3], [u32; 3]),
     ) {
-        let (n, degree) = (self.lattice.n(), self.order().degree());
+        let (n, degree) = (self.lattice().n(), self.order().degree());
         let vertices = mesh.tets[tet.index()];
         let corners = ascending(TET_FACES[face], |corner| vertices[corner].0);
         let is_outward = from_lowest(corners) == from_lowest(TET_FACES[face]);
         let ids = self.face_ids(mesh, tet, corners);
-        for_each_face_child(self.cells.n(), |j, k, upright| {
+        for_each_face_child(self.cells().n(), |j, k, upright| {
             let [p, q, r] = if upright {
                 [[j, k], [j + 1, k], [j, k + 1]]
             } else {

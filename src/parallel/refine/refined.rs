@@ -3,10 +3,11 @@
 use super::curved::steps;
 use super::diagonal::TetDiagonals;
 use super::lattice::{
-    Lattice, OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place, for_each_face_child, octahedron_child_on_face,
+    OCTAHEDRON, UPRIGHT, UPSIDE_DOWN, corner_place, for_each_face_child, octahedron_child_on_face,
 };
 use super::numbering::{Entity, Numbering, ascending};
 use super::periodic::fine_images;
+use super::rows::Rows;
 use super::tet::{Inside, Lattices};
 use crate::ground::mesh::periodic::{Link, PeriodicMap};
 use crate::ground::mesh::stream::{
@@ -296,13 +297,17 @@ impl RefinedMesh {
         block.tets.clear();
         block.edge_nodes.clear();
         block.tets.reserve(children as usize);
+        let order = self.order();
+        let mut first = 0;
         for (c, d, count) in cells.rows() {
-            let first = cells.octahedron_row(c, d);
             let diagonal = |octahedron| diagonals.get(first + octahedron);
-            match self.order() {
-                Order::First => push_row(rows_around(cells, c, d), count, &mut block.tets, diagonal),
-                Order::Second => push_nodes(self.numbering.lattice(), [c, d, count], block, diagonal),
+            match order {
+                Order::First => {
+                    push_row(self.numbering.cell_rows().around(c, d), count, &mut block.tets, diagonal);
+                }
+                Order::Second => push_nodes(self.numbering.rows(), [c, d, count], block, diagonal),
             }
+            first += count - 1;
         }
         block.first_id = self.coarse.tet_ids[tet] * u64::from(children);
         block.first_local = tet as u64 * u64::from(children);
@@ -310,24 +315,17 @@ impl RefinedMesh {
     }
 }
 
-/// The starts of the four rows of points around a row of cells, numbered as in [`corner_place`].
-fn rows_around(lattice: Lattice, c: u32, d: u32) -> [u32; 4] {
-    let inside = c + d + 2 <= lattice.n();
-    let row = |c, d| lattice.row(c, d);
-    [row(c, d), row(c + 1, d), row(c, d + 1), if inside { row(c + 1, d + 1) } else { 0 }]
-}
-
 /// Appends the ten-node children of a row of `count` cells (·, c, d), by points of the lattice of
 /// nodes.
-fn push_nodes(lattice: Lattice, [c, d, count]: [u32; 3], block: &mut TetBlock, diagonal: impl Fn(u32) -> u8) {
+fn push_nodes(rows: &Rows, [c, d, count]: [u32; 3], block: &mut TetBlock, diagonal: impl Fn(u32) -> u8) {
     // The starts of the rows of nodes around the row of cells; those outside the tet are not used.
     let row = |i: u32, j: u32| {
         let (c, d) = (2 * c + i, 2 * d + j);
-        if c + d <= lattice.n() { lattice.row(c, d) } else { 0 }
+        if c + d <= rows.lattice().n() { rows.start(c, d) as u32 } else { 0 }
     };
-    let rows = [0, 1, 2].map(|j| [0, 1, 2].map(|i| row(i, j)));
+    let around = [0, 1, 2].map(|j| [0, 1, 2].map(|i| row(i, j)));
     let places = |corners: [u8; 4]| {
-        steps(corners).map(|[b, c, d]| rows[usize::from(d)][usize::from(c)] + u32::from(b))
+        steps(corners).map(|[b, c, d]| around[usize::from(d)][usize::from(c)] + u32::from(b))
     };
     let mut push = |places: [u32; 10], cell: u32| {
         let [p, q, r, s, edges @ ..] = places.map(|place| place + 2 * cell);
@@ -348,26 +346,27 @@ fn push_nodes(lattice: Lattice, [c, d, count]: [u32; 3], block: &mut TetBlock, d
 }
 
 /// Appends the children of a row of cells, by lattice points.
-fn push_row(rows: [u32; 4], cells: u32, tets: &mut Vec<[u32; 4]>, diagonal: impl Fn(u32) -> u8) {
-    // The last row of a layer has no fourth row of points; none of its children uses it.
-    let corner = |code: u8| {
+fn push_row(rows: [usize; 4], cells: u32, tets: &mut Vec<[u32; 4]>, diagonal: impl Fn(u32) -> u8) {
+    // By corner code.
+    let mut places = [0; 8];
+    for code in 0..8 {
         let (row, shift) = corner_place(code);
-        rows[row] + shift as u32
-    };
+        places[usize::from(code)] = rows[row] as u32 + shift as u32;
+    }
     // Written out because closures in `map` are not always inlined, and this is the innermost loop.
-    let along = |[p, q, r, s]: [u32; 4], cell: u32| [p + cell, q + cell, r + cell, s + cell];
-    let upright = UPRIGHT.map(corner);
-    tets.extend((0..cells).map(|cell| along(upright, cell)));
-    // A single cell (as for n = 1) has no octahedron.
-    if cells == 1 {
-        return;
-    }
-    let octahedron = OCTAHEDRON.map(|children| children.map(|child| child.map(corner)));
+    let child = |[p, q, r, s]: [u8; 4], cell: u32| {
+        let at = |code: u8| places[usize::from(code)] + cell;
+        [at(p), at(q), at(r), at(s)]
+    };
+    tets.extend((0..cells).map(|cell| child(UPRIGHT, cell)));
     for cell in 0..cells - 1 {
-        // Diagonals are below 3; the remainder only removes the bounds check.
-        let [p, q, r, s] = octahedron[usize::from(diagonal(cell) % 3)];
-        tets.extend_from_slice(&[along(p, cell), along(q, cell), along(r, cell), along(s, cell)]);
+        // With a constant for each diagonal, the codes become places in registers.
+        let [p, q, r, s] = match diagonal(cell) {
+            0 => OCTAHEDRON[0].map(|codes| child(codes, cell)),
+            1 => OCTAHEDRON[1].map(|codes| child(codes, cell)),
+            _ => OCTAHEDRON[2].map(|codes| child(codes, cell)),
+        };
+        tets.extend_from_slice(&[p, q, r, s]);
     }
-    let upside_down = UPSIDE_DOWN.map(corner);
-    tets.extend((0..cells.saturating_sub(2)).map(|cell| along(upside_down, cell)));
+    tets.extend((0..cells.saturating_sub(2)).map(|cell| child(UPSIDE_DOWN, cell)));
 }

@@ -9,6 +9,7 @@ use super::cut::{Cut, Cutting};
 use super::diagonal::{self, Diagonals};
 use super::lattice::Lattice;
 use super::numbering::Numbering;
+use super::rows::Rows;
 use super::snap::{Coordinates, is_flat};
 use super::{RefineError, Settings};
 use crate::Point;
@@ -60,7 +61,7 @@ pub fn fill(
         }
         size => Either::Right(inside.par_chunks_mut(size)),
     };
-    let (plan, cell_plan) = (Plan::new(lattice), Plan::new(cells));
+    let (rows, cell_rows) = (numbering.rows(), numbering.cell_rows());
     let is_cut = cells.octahedra() > 0;
     type Scratch = (Block, Cutting);
     let fill_one = |scratch: &mut Scratch,
@@ -74,21 +75,21 @@ pub fn fill(
         block.gather(mesh, numbering, tet, before);
         let corners = mesh.tets[tet.index()].map(|v| before[v.index()]);
         let flat = flat[tet.index()];
-        block.fill_odd_part(&plan, &corners, flat);
-        wide(Fill { block, plan: &plan });
+        block.fill_odd_part(rows, &corners, flat);
+        wide(Fill { block, rows });
         let is_even = flat || settings.nested;
         let cut =
             if is_even && is_cut { Cut::Evenly(diagonal::best_of_tet(&corners)) } else { Cut::EachBest };
         if settings.order == Order::First {
             std::mem::swap(&mut block.axes, &mut cutting.axes);
-            cutting.cut(&cell_plan, cut, bytes);
+            cutting.cut(cell_rows, cut, bytes);
             std::mem::swap(&mut block.axes, &mut cutting.axes);
         } else {
-            curved::take_corners(&block.axes, &plan, &cell_plan, &mut cutting.axes);
-            cutting.cut(&cell_plan, cut, bytes);
+            curved::take_corners(&block.axes, rows, cell_rows, &mut cutting.axes);
+            cutting.cut(cell_rows, cut, bytes);
             // Straight tets are proved by the check, with all others.
             if !flat {
-                curved::prove(&block.axes, &plan, cells, settings.nested, bytes, &mut cutting.bad);
+                curved::prove(&block.axes, rows, cells, settings.nested, bytes, &mut cutting.bad);
             }
         }
         let kept = inside.iter_mut();
@@ -117,12 +118,12 @@ pub struct Lattices<'a> {
 
 impl Lattices<'_> {
     fn block(&self, tet: TetId, flat: bool) -> Block {
-        let lattice = self.numbering.lattice();
-        let (mut block, plan) = (Block::new(lattice), Plan::new(lattice));
+        let rows = self.numbering.rows();
+        let mut block = Block::new(rows.lattice());
         block.gather(self.mesh, self.numbering, tet, self.points);
         let corners = self.mesh.tets[tet.index()].map(|v| self.points[v.index()]);
-        block.fill_odd_part(&plan, &corners, flat);
-        wide(Fill { block: &mut block, plan: &plan });
+        block.fill_odd_part(rows, &corners, flat);
+        wide(Fill { block: &mut block, rows });
         block
     }
 
@@ -158,39 +159,6 @@ pub fn inverted(bad: &[BadTet], described: usize) -> RefineError {
     }
 }
 
-/// The starts of the rows of points, computed once.
-pub(super) struct Plan {
-    pub lattice: Lattice,
-    /// By c + (n + 1)·d.
-    rows: Vec<u32>,
-}
-
-impl Plan {
-    fn new(lattice: Lattice) -> Self {
-        let n = lattice.n();
-        let row = |d, c| if c + d <= n { lattice.row(c, d) } else { 0 };
-        Self { lattice, rows: (0..=n).flat_map(|d| (0..=n).map(move |c| row(d, c))).collect() }
-    }
-
-    /// The index of the point (0, c, d).
-    #[inline]
-    pub fn row(&self, c: u32, d: u32) -> usize {
-        self.rows[(c + (self.lattice.n() + 1) * d) as usize] as usize
-    }
-
-    /// The starts of the four rows of points around a row of cells, numbered as in
-    /// [`corner_place`]; 0 outside the tet.
-    pub fn around(&self, c: u32, d: u32) -> [usize; 4] {
-        let inside = c + d + 2 <= self.lattice.n();
-        [
-            self.row(c, d),
-            self.row(c + 1, d),
-            self.row(c, d + 1),
-            if inside { self.row(c + 1, d + 1) } else { 0 },
-        ]
-    }
-}
-
 /// Parents of a new lattice point, indexed by the parity bits of (b, c, d)/s: offsets of the points
 /// whose mean it is.
 ///
@@ -210,7 +178,7 @@ const PARENTS: [&[[i32; 3]]; 8] = [
 /// Computes the interior points of a block with wide registers.
 struct Fill<'a> {
     block: &'a mut Block,
-    plan: &'a Plan,
+    rows: &'a Rows,
 }
 
 impl Wide for Fill<'_> {
@@ -218,7 +186,7 @@ impl Wide for Fill<'_> {
 
     #[inline(always)]
     fn run(self) {
-        self.block.fill_inside(self.plan);
+        self.block.fill_inside(self.rows);
     }
 }
 
@@ -254,12 +222,12 @@ impl Block {
     }
 
     /// Computes the interior points of the odd part of n, from which the dyadic rule starts.
-    fn fill_odd_part(&mut self, plan: &Plan, corners: &[Coordinates; 4], flat: bool) {
-        let (m, power) = split(plan.lattice.n());
+    fn fill_odd_part(&mut self, rows: &Rows, corners: &[Coordinates; 4], flat: bool) {
+        let (m, power) = split(rows.lattice().n());
         if m == 1 {
             return;
         }
-        let index = |b: u32, c: u32, d: u32| plan.row(c * power, d * power) + (b * power) as usize;
+        let index = |b: u32, c: u32, d: u32| rows.start(c * power, d * power) + (b * power) as usize;
         if !flat {
             let [x, y, z] = &self.axes;
             self.blend.take(corners, |[_, b, c, d]| {
@@ -282,14 +250,14 @@ impl Block {
 
     /// Applies the dyadic rule to the interior points.
     #[inline(always)]
-    fn fill_inside(&mut self, plan: &Plan) {
-        let n = plan.lattice.n();
+    fn fill_inside(&mut self, rows: &Rows) {
+        let n = rows.lattice().n();
         let mut step = split(n).1 / 2;
         while step > 0 {
             for d in (step..n).step_by(step as usize) {
                 for c in (step..n - d).step_by(step as usize) {
                     for first in [step, 2 * step] {
-                        self.fill_row(plan, step, [first, c, d]);
+                        self.fill_row(rows, step, [first, c, d]);
                     }
                 }
             }
@@ -299,16 +267,16 @@ impl Block {
 
     /// Computes every second point of a row, starting at `b`.
     #[inline(always)]
-    fn fill_row(&mut self, plan: &Plan, step: u32, [b, c, d]: [u32; 3]) {
+    fn fill_row(&mut self, rows: &Rows, step: u32, [b, c, d]: [u32; 3]) {
         let odd = |x: u32| (x / step % 2) as usize;
         let parents = PARENTS[odd(b) | odd(c) << 1 | odd(d) << 2];
-        let end = plan.lattice.n() - c - d;
+        let end = rows.lattice().n() - c - d;
         if parents.is_empty() || b >= end {
             return;
         }
         let moved = |x: u32, by: i32| x.wrapping_add_signed(by * step as i32);
-        let start = |by: &[i32; 3]| plan.row(moved(c, by[1]), moved(d, by[2])) + moved(b, by[0]) as usize;
-        let to = plan.row(c, d) + b as usize;
+        let start = |by: &[i32; 3]| rows.start(moved(c, by[1]), moved(d, by[2])) + moved(b, by[0]) as usize;
+        let to = rows.start(c, d) + b as usize;
         let along = (0..(end - b) as usize).step_by(2 * step as usize);
         if let [p, q] = parents {
             let [p, q] = [start(p), start(q)];
