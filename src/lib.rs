@@ -208,8 +208,8 @@ pub mod repartition {
 /// Checks of meshes, as streams.
 pub mod check {
     pub use crate::parallel::check::{
-        Checksum, Extreme, Fault, OffSurface, PartReport, Settings, ShapeReport, check, check_part, checksum,
-        checksum_of_all,
+        Checksum, Extreme, Fault, OffSurface, PartReport, Settings, ShapeReport, check, check_and_sum,
+        check_part, check_part_and_sum, checksum, checksum_of_all,
     };
 }
 

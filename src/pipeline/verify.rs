@@ -8,9 +8,6 @@ use crate::ground::progress::Work;
 use crate::ground::projector::Projector;
 use crate::parallel::check::{self, Checksum, PartReport};
 
-/// The check and the checksum each read all tets.
-const PASSES: u64 = 2;
-
 /// **Collective.** Checks all tets, and all boundary vertices if there is a `projector` (except
 /// those that may be `off_surface`), and computes the checksum.
 ///
@@ -23,10 +20,9 @@ pub(super) fn verify(
     off_surface: &[GlobalId],
     work: &Work,
 ) -> Result<(PartReport, Checksum), Error> {
-    let part = &Watched::new(part, work, PASSES);
-    let report =
-        check::check(comm, part, projector, &check::Settings { off_surface, ..check::Settings::default() })?;
-    let checksum = check::checksum_of_all(comm, part)?;
+    let part = &Watched::new(part, work, 1);
+    let settings = check::Settings { off_surface, ..check::Settings::default() };
+    let (report, checksum) = check::check_and_sum(comm, part, projector, &settings)?;
     // A cancelled check has not seen all tets.
     comm.agree(work.proceed().map_err(Error::from))?;
     if report.faults > 0 {

@@ -38,8 +38,14 @@ impl Table {
     /// counts as ±1.
     #[inline(always)]
     pub fn whole_degrees(&self, cosine: f64) -> usize {
+        self.whole_degrees_in(cell(cosine), cosine)
+    }
+
+    /// The same for a cosine whose [`cell`] is known.
+    #[inline(always)]
+    pub fn whole_degrees_in(&self, cell: u64, cosine: f64) -> usize {
         // Both indices are within the tables by their lengths.
-        let mut degrees = self.first[cell(cosine) % (2 * CELLS)];
+        let mut degrees = self.first[cell as usize % (2 * CELLS)];
         // Nearly always zero or one step: the first without a branch.
         degrees += u8::from(cosine <= self.cosines[usize::from(degrees) + 1]);
         while cosine <= self.cosines[usize::from(degrees) + 1] {
@@ -49,15 +55,35 @@ impl Table {
     }
 }
 
-/// The cell of a cosine. The integer appears in the low bits of a float that is large enough; this
-/// vectorises, unlike conversion to integers.
+/// The cell of a cosine in the table.
 #[inline(always)]
-fn cell(cosine: f64) -> usize {
-    const LARGE: f64 = (1_u64 << 52) as f64;
-    let clamped = if cosine > -1.0 { cosine } else { -1.0 };
-    let clamped = if clamped < 1.0 { clamped } else { 1.0 };
-    let bits = ((clamped + 1.0) * (CELLS / 2) as f64 + LARGE).to_bits();
-    (bits & !LARGE.to_bits()) as usize
+pub fn cell(cosine: f64) -> u64 {
+    nearest((cosine + 1.0) * (CELLS / 2) as f64, CELLS as f64)
+}
+
+/// Floats from here on are integers: their low bits are those of the integer. Adding it vectorises,
+/// unlike conversion to integers.
+const LARGE: f64 = (1_u64 << 52) as f64;
+
+#[inline(always)]
+fn clamp(number: f64, most: f64) -> f64 {
+    let clamped = if number > 0.0 { number } else { 0.0 };
+    if clamped < most { clamped } else { most }
+}
+
+/// The integer nearest to a number that is clamped to 0 and `most`.
+#[inline(always)]
+fn nearest(number: f64, most: f64) -> u64 {
+    (clamp(number, most) + LARGE).to_bits() & !LARGE.to_bits()
+}
+
+/// The whole part of a number that is clamped to 0 and `most`.
+#[inline(always)]
+pub fn whole(number: f64, most: f64) -> u64 {
+    let number = clamp(number, most);
+    let near = (number + LARGE) - LARGE;
+    let whole = if near > number { near - 1.0 } else { near };
+    (whole + LARGE).to_bits() & !LARGE.to_bits()
 }
 
 #[cfg(test)]
@@ -72,5 +98,13 @@ mod tests {
             assert_eq!(table.whole_degrees(angle.to_radians().cos()), angle as usize, "{angle}");
         }
         assert_eq!([1.1, 1.0, -1.0, -1.1].map(|cosine| table.whole_degrees(cosine)), [0, 0, 179, 179]);
+    }
+
+    #[test]
+    fn whole_parts_are_those_of_conversion() {
+        for k in -40..=4000 {
+            let number = f64::from(k) / 16.0;
+            assert_eq!(whole(number, 199.0), (number as u64).min(199), "{number}");
+        }
     }
 }

@@ -62,7 +62,11 @@ impl std::fmt::Display for Checksum {
 /// # Errors
 /// [`CommError`] if another rank fails.
 pub fn checksum_of_all(comm: &dyn Communicator, stream: &dyn MeshStream) -> Result<Checksum, CommError> {
-    let mine = checksum(stream);
+    sum_of_all(comm, checksum(stream))
+}
+
+/// **Collective.** The checksum of the whole mesh, from those of the parts.
+pub(super) fn sum_of_all(comm: &dyn Communicator, mine: Checksum) -> Result<Checksum, CommError> {
     let bytes = [mine.vertices, mine.tets, mine.boundary, mine.open].map(u64::to_le_bytes).concat();
     let all = comm.all_gather_bytes(&bytes)?;
     let sum = |sum: Checksum, bytes: &Vec<u8>| {
@@ -76,14 +80,24 @@ pub fn checksum_of_all(comm: &dyn Communicator, stream: &dyn MeshStream) -> Resu
 
 /// *Local.* The checksum of this rank's part.
 pub fn checksum(stream: &dyn MeshStream) -> Checksum {
+    let of_tets = |(block, hashed): &mut (LocalBlock, Hashed), index| {
+        if stream.work().is_cancelled() {
+            return Checksum::default();
+        }
+        stream.local_block(index, block);
+        of_tets(stream, block, hashed)
+    };
+    let tets = (0..stream.tet_blocks()).into_par_iter().map_init(Default::default, of_tets);
+    without_tets(stream).plus(tets.reduce(Checksum::default, Checksum::plus))
+}
+
+/// The checksum of this rank's vertices and boundary.
+pub(super) fn without_tets(stream: &dyn MeshStream) -> Checksum {
     let vertices = (0..stream.vertex_blocks()).into_par_iter().map(|index| of_vertices(stream, index));
-    let tets = (0..stream.tet_blocks())
-        .into_par_iter()
-        .map_init(Scratch::default, |scratch, index| of_tets(stream, index, scratch));
     let boundary = (0..stream.boundary_blocks())
         .into_par_iter()
         .map_init(BoundaryBlock::default, |block, index| of_boundary(stream, index, block));
-    vertices.chain(tets).chain(boundary).reduce(Checksum::default, Checksum::plus)
+    vertices.chain(boundary).reduce(Checksum::default, Checksum::plus)
 }
 
 fn of_vertices(stream: &dyn MeshStream, index: usize) -> Checksum {
@@ -98,20 +112,16 @@ fn of_vertices(stream: &dyn MeshStream, index: usize) -> Checksum {
     Checksum { vertices: sum, ..Checksum::default() }
 }
 
-/// Scratch space of one thread.
+/// The vertices of a block; scratch space of one thread.
 #[derive(Default)]
-struct Scratch {
-    block: LocalBlock,
+pub(super) struct Hashed {
     ids: Vec<GlobalId>,
     places: Vec<Place>,
 }
 
-fn of_tets(stream: &dyn MeshStream, index: usize, scratch: &mut Scratch) -> Checksum {
-    if stream.work().is_cancelled() {
-        return Checksum::default();
-    }
-    let Scratch { block, ids, places } = scratch;
-    stream.local_block(index, block);
+/// The checksum of the tets of a block, all of whose vertices must exist.
+pub(super) fn of_tets(stream: &dyn MeshStream, block: &LocalBlock, hashed: &mut Hashed) -> Checksum {
+    let Hashed { ids, places } = hashed;
     stream.block_ids(block, ids);
     places.clear();
     places.extend(ids.iter().map(|&id| place(id)));

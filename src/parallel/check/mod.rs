@@ -16,7 +16,7 @@ pub mod report;
 pub mod shape;
 
 pub use checksum::{Checksum, checksum, checksum_of_all};
-pub use part::{Settings, check, check_part};
+pub use part::{Settings, check, check_and_sum, check_part, check_part_and_sum};
 pub use report::{Extreme, OffSurface, PartReport, ShapeReport};
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! The check of a part: its vertex blocks, boundary and tets, each in one parallel pass.
 
 use super::boundary::{Side, check_block, check_parents, check_range, sides_of};
-use super::report::{Extreme, PartReport, RATIO_BINS, ShapeReport};
-use super::shape::{Batch, Extremes, Shapes};
+use super::checksum::{self, Checksum, Hashed};
+use super::report::{Extreme, PartReport, ShapeReport};
+use super::shape::{Batch, Measures, Shapes};
 use super::{Fault, angles, curved};
 use crate::ground::comm::{CommError, Communicator};
 use crate::ground::mesh::GlobalId;
@@ -41,11 +42,33 @@ const CHUNKS: usize = 1024;
 ///
 /// Matching faces between tets are not checked here but by the [`checksum`](super::checksum()).
 pub fn check_part(stream: &dyn MeshStream, projector: Option<&Projector>, settings: &Settings) -> PartReport {
+    check_all_but_sum(stream, projector, settings, false).0
+}
+
+/// *Local.* [`check_part`] and the part's [`checksum`](super::checksum()) (of the tets that have all
+/// their vertices), in one pass over the tets.
+pub fn check_part_and_sum(
+    stream: &dyn MeshStream,
+    projector: Option<&Projector>,
+    settings: &Settings,
+) -> (PartReport, Checksum) {
+    let (report, tets) = check_all_but_sum(stream, projector, settings, true);
+    (report, checksum::without_tets(stream).plus(tets))
+}
+
+/// Checks this rank's part; also returns the checksum of its tets if `sum`.
+fn check_all_but_sum(
+    stream: &dyn MeshStream,
+    projector: Option<&Projector>,
+    settings: &Settings,
+    sum: bool,
+) -> (PartReport, Checksum) {
     let mut report = check_vertices(stream, settings);
     let (boundary, sides) = check_boundary(stream, projector, settings);
     report = report.merged(boundary, settings.described);
     check_range(stream, &sides, settings, &mut report);
-    report.merged(check_tets(stream, &sides, settings), settings.described)
+    let (tets, checksum) = check_tets(stream, &sides, settings, sum);
+    (report.merged(tets, settings.described), checksum)
 }
 
 /// **Collective.** Checks all parts. Every rank gets the report of the whole mesh, with its counts
@@ -59,7 +82,31 @@ pub fn check(
     projector: Option<&Projector>,
     settings: &Settings,
 ) -> Result<PartReport, CommError> {
-    let mine = check_part(stream, projector, settings);
+    report_of_all(comm, stream, check_part(stream, projector, settings), settings)
+}
+
+/// **Collective.** [`check()`] and [`checksum_of_all`](super::checksum_of_all) in one pass over the
+/// tets.
+///
+/// # Errors
+/// [`CommError`] if another rank fails.
+pub fn check_and_sum(
+    comm: &dyn Communicator,
+    stream: &dyn MeshStream,
+    projector: Option<&Projector>,
+    settings: &Settings,
+) -> Result<(PartReport, Checksum), CommError> {
+    let (report, sum) = check_part_and_sum(stream, projector, settings);
+    Ok((report_of_all(comm, stream, report, settings)?, checksum::sum_of_all(comm, sum)?))
+}
+
+/// **Collective.** Merges the reports of the parts, and compares their counts to the stated totals.
+fn report_of_all(
+    comm: &dyn Communicator,
+    stream: &dyn MeshStream,
+    mine: PartReport,
+    settings: &Settings,
+) -> Result<PartReport, CommError> {
     let text = |report: &PartReport| serde_json::to_vec(report).expect("plain data with text keys");
     let read = |bytes: &Vec<u8>| serde_json::from_slice(bytes).expect("what this program wrote");
     // Merge on one rank: with an all-gather, a thousand ranks would receive gigabytes.
@@ -138,30 +185,43 @@ struct Scratch {
     boundary: BoundaryBlock,
     batch: Batch,
     shapes: Shapes,
+    hashed: Hashed,
 }
 
-fn check_tets(stream: &dyn MeshStream, sides: &[Side], settings: &Settings) -> PartReport {
-    let check = |scratch: &mut Scratch, range| check_chunk(stream, sides, settings, scratch, range);
+fn check_tets(
+    stream: &dyn MeshStream,
+    sides: &[Side],
+    settings: &Settings,
+    sum: bool,
+) -> (PartReport, Checksum) {
+    let check = |scratch: &mut Scratch, range: Range<usize>| {
+        let mut checksum = sum.then(Checksum::default);
+        let (tets, report) = check_chunk(stream, sides, settings, scratch, range, checksum.as_mut());
+        (tets, report, checksum.unwrap_or_default())
+    };
     let checked: Vec<_> = chunks(stream.tet_blocks()).map_init(Scratch::default, check).collect();
-    let mut report = PartReport::default();
+    let (mut report, mut checksum) = (PartReport::default(), Checksum::default());
     let mut next = 0;
-    for (tets, chunk) in checked {
+    for (tets, chunk, sum) in checked {
         if tets.start != next {
             report.add_fault(Fault::Gap { rank: stream.rank(), at: next }, settings.described);
         }
         next = tets.end;
         report = report.merged(chunk, settings.described);
+        checksum = checksum.plus(sum);
     }
-    report
+    (report, checksum)
 }
 
-/// Checks the tets of some blocks; also returns the range of their local indices.
+/// Checks the tets of some blocks, and adds them to `checksum`; also returns the range of their
+/// local indices.
 fn check_chunk(
     stream: &dyn MeshStream,
     sides: &[Side],
     settings: &Settings,
     scratch: &mut Scratch,
     blocks: Range<usize>,
+    mut checksum: Option<&mut Checksum>,
 ) -> (Range<u64>, PartReport) {
     let mut report = PartReport::default();
     let mut covered: Option<Range<u64>> = None;
@@ -171,7 +231,7 @@ fn check_chunk(
         if stream.work().is_cancelled() {
             break;
         }
-        let Scratch { block, points, boundary, batch, shapes } = &mut *scratch;
+        let Scratch { block, points, boundary, batch, shapes, hashed } = &mut *scratch;
         stream.local_block(index, block);
         let tets = &block.tets;
         let range = tets.first_local..tets.first_local + tets.tets.len() as u64;
@@ -186,6 +246,9 @@ fn check_chunk(
         stream.block_points(block, points);
         let missing = |vertex: u32| vertex >= vertices;
         let all_there = !block.vertices.iter().any(|&vertex| missing(vertex));
+        if let Some(sum) = checksum.as_deref_mut().filter(|_| all_there) {
+            *sum = sum.plus(checksum::of_tets(stream, block, hashed));
+        }
         for (id, tet) in (tets.first_id..).zip(&tets.tets) {
             if let Some(vertex) =
                 tet.iter().map(|&k| block.vertices[k as usize]).find(|&v| !all_there && missing(v))
@@ -219,25 +282,24 @@ fn flush(
     if batch.is_empty() {
         return;
     }
-    batch.volumes(shapes);
-    let mut volume6 = 0.0;
-    for lane in 0..batch.len() {
-        volume6 += shapes.volume6[lane];
-        if !batch.is_positive(shapes, lane) {
+    let volumes = batch.volumes(shapes);
+    if !volumes.all_positive {
+        for lane in (0..batch.len()).filter(|&lane| !batch.is_positive(shapes, lane)) {
             let fault = Fault::NotPositive { tet: batch.id(lane), place: batch.centroid(lane) };
             report.add_fault(fault, settings.described);
         }
     }
     report.tets += batch.len() as u64;
-    report.add_volume(body, volume6 / 6.0);
+    report.add_volume(body, volumes.sum6 / 6.0);
     if settings.shapes {
-        let extremes = batch.shapes(shapes);
-        add_shapes(batch, shapes, extremes, &mut report.shape);
+        let measures = batch.shapes(shapes);
+        add_shapes(batch, shapes, measures, &mut report.shape);
     }
     batch.clear();
 }
 
-fn add_shapes(batch: &Batch, shapes: &Shapes, found: Extremes, report: &mut Option<ShapeReport>) {
+fn add_shapes(batch: &Batch, shapes: &Shapes, measures: Measures, report: &mut Option<ShapeReport>) {
+    let found = measures.extremes;
     let lane_of = |values: &[f64], value: f64| values.iter().position(|v| *v == value).unwrap_or(0);
     let extreme = |value, lane| Extreme { value, tet: batch.id(lane), place: batch.centroid(lane) };
     let degrees = |cosine: f64| cosine.clamp(-1.0, 1.0).acos().to_degrees();
@@ -258,11 +320,11 @@ fn add_shapes(batch: &Batch, shapes: &Shapes, found: Extremes, report: &mut Opti
     }
     let Some(report) = report else { return };
     let degrees_of = angles::Table::get();
+    report.sum_of_ratios += measures.sum_of_ratios;
+    let [ratios, smallest, largest] = &shapes.bins;
     for lane in 0..batch.len() {
-        let ratio = shapes.mean_ratio[lane];
-        report.sum_of_ratios += ratio;
-        report.ratios[((ratio * RATIO_BINS as f64) as usize).min(RATIO_BINS - 1)] += 1;
-        report.smallest_angles[degrees_of.whole_degrees(shapes.smallest[lane])] += 1;
-        report.largest_angles[degrees_of.whole_degrees(shapes.largest[lane])] += 1;
+        report.ratios[ratios[lane] as usize] += 1;
+        report.smallest_angles[degrees_of.whole_degrees_in(smallest[lane], shapes.smallest[lane])] += 1;
+        report.largest_angles[degrees_of.whole_degrees_in(largest[lane], shapes.largest[lane])] += 1;
     }
 }

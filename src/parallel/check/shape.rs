@@ -4,6 +4,8 @@
 //! vectorise. All operations are basic IEEE arithmetic, so the results are the same on all
 //! machines.
 
+use super::angles;
+use super::report::RATIO_BINS;
 use crate::Point;
 use crate::ground::kernel::predicates::{Sign, orient3d, volume6_and_error};
 use crate::ground::kernel::vector::{Wide, wide};
@@ -33,6 +35,26 @@ pub struct Shapes {
     pub smallest: [f64; BATCH],
     /// Cosine of the largest dihedral angle.
     pub largest: [f64; BATCH],
+    /// The bin of the mean ratio, and the cells of both cosines in the [table](super::angles).
+    pub bins: [[u64; BATCH]; 3],
+}
+
+/// What the volumes of some tets say of all of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Volumes {
+    /// The sum of six times the volumes.
+    pub sum6: f64,
+    /// Whether all tets are positive beyond the rounding error bound.
+    pub all_positive: bool,
+}
+
+/// What the shapes of some tets say of all of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Measures {
+    /// The worst shapes.
+    pub extremes: Extremes,
+    /// The sum of the mean ratios.
+    pub sum_of_ratios: f64,
 }
 
 /// The worst shapes of some tets.
@@ -66,7 +88,8 @@ impl Extremes {
 impl Default for Shapes {
     fn default() -> Self {
         let zero = [0.0; BATCH];
-        Self { volume6: zero, error: zero, mean_ratio: zero, smallest: zero, largest: zero }
+        let bins = [[0; BATCH]; 3];
+        Self { volume6: zero, error: zero, mean_ratio: zero, smallest: zero, largest: zero, bins }
     }
 }
 
@@ -136,9 +159,9 @@ impl Batch {
         [q[0][lane] - p[0][lane], q[1][lane] - p[1][lane], q[2][lane] - p[2][lane]]
     }
 
-    /// Volumes and their error bounds.
-    pub fn volumes(&self, shapes: &mut Shapes) {
-        wide(Volumes(self, shapes));
+    /// Computes volumes and their error bounds.
+    pub fn volumes(&self, shapes: &mut Shapes) -> Volumes {
+        wide(FindVolumes(self, shapes))
     }
 
     /// Whether a tet is positively oriented, exactly; after [`volumes`](Self::volumes).
@@ -151,10 +174,9 @@ impl Batch {
         orient3d(&p, &q, &r, &s) == Sign::Positive
     }
 
-    /// Computes mean ratios and dihedral angles, and returns the extremes; call
-    /// [`volumes`](Self::volumes) first.
-    pub fn shapes(&self, shapes: &mut Shapes) -> Extremes {
-        wide(Measures(self, shapes))
+    /// Computes mean ratios and dihedral angles; call [`volumes`](Self::volumes) first.
+    pub fn shapes(&self, shapes: &mut Shapes) -> Measures {
+        wide(Measure(self, shapes))
     }
 
     #[inline(always)]
@@ -184,54 +206,98 @@ impl Batch {
         let opposite = [self.edge(1, 2, lane), self.edge(1, 3, lane)];
         // Outward normals, each of the face opposite its corner.
         let normals = [cross(opposite[0], opposite[1]), cross(w, v), cross(u, w), cross(v, u)];
-        let length = |k: usize| 1.0 / square(normals[k]).sqrt();
-        let inverse = [length(0), length(1), length(2), length(3)];
-        let cosine = |p: usize, q: usize| -dot(normals[p], normals[q]) * (inverse[p] * inverse[q]);
-        let cosines = [cosine(0, 1), cosine(0, 2), cosine(0, 3), cosine(1, 2), cosine(1, 3), cosine(2, 3)];
+        // Divisions and roots take most of the time. Squares of cosines, with the sign of the cosine,
+        // are in the same order, so only the extremes need a root; and the inverses of two numbers
+        // take one division.
+        let squares = [square(normals[0]), square(normals[1]), square(normals[2]), square(normals[3])];
+        let (first, last) = (1.0 / (squares[0] * squares[1]), 1.0 / (squares[2] * squares[3]));
+        let inverse = [first * squares[1], first * squares[0], last * squares[3], last * squares[2]];
+        let signed = |p: usize, q: usize| {
+            let product = -dot(normals[p], normals[q]);
+            product * product.abs() * (inverse[p] * inverse[q])
+        };
+        let [a, b, c] = [signed(0, 1), signed(0, 2), signed(0, 3)];
+        let [d, e, f] = [signed(1, 2), signed(1, 3), signed(2, 3)];
         let more = |p: f64, q: f64| if q > p { q } else { p };
         let less = |p: f64, q: f64| if q < p { q } else { p };
-        let [a, b, c, d, e, f] = cosines;
-        (more(more(more(a, b), more(c, d)), more(e, f)), less(less(less(a, b), less(c, d)), less(e, f)))
+        let most = more(more(more(a, b), more(c, d)), more(e, f));
+        let least = less(less(less(a, b), less(c, d)), less(e, f));
+        (most.abs().sqrt().copysign(most), least.abs().sqrt().copysign(least))
     }
 }
 
-struct Volumes<'a>(&'a Batch, &'a mut Shapes);
+struct FindVolumes<'a>(&'a Batch, &'a mut Shapes);
 
-impl Wide for Volumes<'_> {
-    type Output = ();
+impl Wide for FindVolumes<'_> {
+    type Output = Volumes;
 
     #[inline(always)]
-    fn run(self) {
+    fn run(self) -> Volumes {
         let Self(batch, shapes) = self;
         for lane in 0..BATCH {
             let edges = [batch.edge(0, 1, lane), batch.edge(0, 2, lane), batch.edge(0, 3, lane)];
             (shapes.volume6[lane], shapes.error[lane]) = volume6_and_error(edges);
         }
+        // The unused lanes count as positive and add nothing.
+        shapes.volume6[batch.count..].fill(0.0);
+        shapes.error[batch.count..].fill(-1.0);
+        let mut all_positive = true;
+        for lane in 0..BATCH {
+            all_positive &= shapes.volume6[lane] > shapes.error[lane];
+        }
+        Volumes { sum6: sum(&shapes.volume6), all_positive }
     }
 }
 
-struct Measures<'a>(&'a Batch, &'a mut Shapes);
+struct Measure<'a>(&'a Batch, &'a mut Shapes);
 
-impl Wide for Measures<'_> {
-    type Output = Extremes;
+impl Wide for Measure<'_> {
+    type Output = Measures;
 
     #[inline(always)]
-    fn run(self) -> Extremes {
+    fn run(self) -> Measures {
         let Self(batch, shapes) = self;
         batch.measure(shapes);
+        shapes.mean_ratio[batch.count..].fill(0.0);
+        let sum_of_ratios = sum(&shapes.mean_ratio);
+        let [ratios, smallest, largest] = &mut shapes.bins;
+        for lane in 0..BATCH {
+            ratios[lane] = bin(shapes.mean_ratio[lane]);
+            smallest[lane] = angles::cell(shapes.smallest[lane]);
+            largest[lane] = angles::cell(shapes.largest[lane]);
+        }
         // Fill the unused lanes with copies of the first tet, which do not change the extremes.
         for lane in batch.count..BATCH {
             shapes.mean_ratio[lane] = shapes.mean_ratio[0];
             shapes.smallest[lane] = shapes.smallest[0];
             shapes.largest[lane] = shapes.largest[0];
         }
-        Extremes {
+        let extremes = Extremes {
             mean_ratio: least(&shapes.mean_ratio, 1.0),
             smallest: -least(&shapes.smallest, -1.0),
             largest: least(&shapes.largest, 1.0),
             scaled_jacobian: 1.0,
+        };
+        Measures { extremes, sum_of_ratios }
+    }
+}
+
+/// The bin of a mean ratio.
+#[inline(always)]
+fn bin(ratio: f64) -> u64 {
+    angles::whole(ratio * RATIO_BINS as f64, (RATIO_BINS - 1) as f64)
+}
+
+/// The sum of some numbers.
+#[inline(always)]
+fn sum(numbers: &[f64; BATCH]) -> f64 {
+    let mut sums = [0.0; 8];
+    for chunk in numbers.as_chunks::<8>().0 {
+        for lane in 0..8 {
+            sums[lane] += chunk[lane];
         }
     }
+    sums.into_iter().sum()
 }
 
 /// The minimum of some numbers, each multiplied by a sign.

@@ -121,7 +121,7 @@ pub(super) fn worst_children(refined: &RefinedMesh, tet: usize) -> Extremes {
         batch.clear();
         tets.iter().for_each(|tet| batch.push(0, tet.map(|v| points[v as usize])));
         batch.volumes(&mut shapes);
-        worst = worst.with(batch.shapes(&mut shapes));
+        worst = worst.with(batch.shapes(&mut shapes).extremes);
     }
     for (corners, edges) in block.tets.iter().zip(&block.edge_nodes) {
         let nodes = jacobian::nodes(*corners, *edges, |v| points[v as usize]);
