@@ -158,6 +158,27 @@ mod tests {
     use super::*;
 
     #[test]
+    fn small_spheres_and_the_walls_of_deep_holes_have_sizes_of_their_curvature() {
+        let text = "algebraic3d
+            solid plate = orthobrick (0, 0, 0; 1, 1, 0.1);
+            solid ball = sphere (0.5, 0.5, 0; 0.001);
+            solid hole = cylinder (0.2, 0.3, 0; 0.2, 0.3, 1; 0.002);
+            solid main = plate and not ball and not hole;
+            tlo main;";
+        let geometry = csg::language::parse_geometry(text, "small.geo").unwrap().geometry;
+        let features = Features::find(&geometry).unwrap();
+        for scale in [1.0, 0.15] {
+            let settings = SizeSettings { scale, ..SizeSettings::default() };
+            let size = GeometricSize::new(&geometry, &features, &settings);
+            let of_radius = |radius: f64| scale * radius / settings.curvature_safety;
+            for (place, radius) in [([0.5, 0.5, 0.001], 0.001), ([0.2, 0.302, 0.05], 0.002)] {
+                let found = size.size_at(&Point::from(place)) / of_radius(radius);
+                assert!((0.9..1.3).contains(&found), "{found} of the size, scale {scale}, at {place:?}");
+            }
+        }
+    }
+
+    #[test]
     fn a_scale_coarsens_thin_regions_up_to_one_layer_of_good_prisms() {
         let at = |ratio: f64, scale: f64| {
             let closeness = Closeness { ratio, most: 8.0 };

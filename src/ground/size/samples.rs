@@ -145,15 +145,30 @@ impl Sampler<'_> {
         (self.settings.scale / (self.settings.curvature_safety * curvature)).max(self.settings.minh)
     }
 
-    /// The size that a surface imposes at a point on it.
+    /// The size that a surface imposes at a point on a curve in it.
     fn size_on(&self, surface: SurfaceId, point: &Point) -> f64 {
+        self.surface_bound(surface).min(self.curvature_size(surface, point))
+    }
+
+    /// The size that a surface imposes at a point within a patch.
+    fn size_within(&self, surface: SurfaceId, point: &Point) -> f64 {
+        let least = if self.constant_size(surface) { 0.0 } else { self.least_edge() };
+        self.surface_bound(surface).min(self.curvature_size(surface, point).max(least))
+    }
+
+    /// The bound of a surface in the file.
+    fn surface_bound(&self, surface: SurfaceId) -> f64 {
         let bound = self.geometry.surface_info[surface.index()].maxh.unwrap_or(f64::INFINITY);
+        self.settings.scaled_bound(bound)
+    }
+
+    /// The size from the curvature of a surface at a point on it.
+    fn curvature_size(&self, surface: SurfaceId, point: &Point) -> f64 {
         let shape = &self.geometry.surfaces[surface.index()];
         // The curvature of an apex is undefined; the points near it determine the size.
         let beside = APEX * self.features.bounds.diagonal();
         let is_apex = shape.apex().is_some_and(|apex| (point - apex).norm() <= beside);
-        let curvature = if is_apex { 0.0 } else { shape.curvature(point) };
-        self.settings.scaled_bound(bound).min(self.size_of_curvature(curvature))
+        self.size_of_curvature(if is_apex { 0.0 } else { shape.curvature(point) })
     }
 
     /// The bound of a cutout, infinity if it has none.
@@ -248,7 +263,7 @@ impl Sampler<'_> {
         here.dedup();
         open.retain(|surface| here.binary_search(surface).is_ok());
         open.retain(|&surface| self.is_coarse(surface, (&bodies, &here), &center, edge, samples));
-        if open.is_empty() || edge < self.least_edge() {
+        if open.is_empty() {
             return;
         }
         let sample_child = |child: usize, samples: &mut Samples| {
@@ -283,9 +298,8 @@ impl Sampler<'_> {
         prune_in(&self.geometry.surfaces, &cell, bodies)
     }
 
-    /// The size of cells that are not divided: near a singular point (apex of a cone) the size
-    /// tends to zero. Sizes below a thousandth of the geometry come from sources, not from
-    /// curvature.
+    /// A length below which neither distances of surfaces nor curvature lower the size, unless the
+    /// curvature is constant: near a singular point (apex of a cone) the size tends to zero.
     fn least_edge(&self) -> f64 {
         1e-3 * self.features.bounds.diagonal() * self.settings.scale.min(1.0)
     }
@@ -302,14 +316,14 @@ impl Sampler<'_> {
         samples: &mut Samples,
     ) -> bool {
         let shape = &self.geometry.surfaces[surface.index()];
-        let Ok(point) = shape.project(center) else { return true };
+        let constant = self.constant_size(surface);
+        let Ok(point) = shape.project(center) else { return constant || edge >= self.least_edge() };
         if (point - center).norm() > edge {
             return false;
         }
-        let own =
-            self.size_on(surface, &point).min(self.least_body_bound()).min(self.least_cutout_bound(surface));
+        let own = self.size_within(surface, &point);
+        let own = own.min(self.least_body_bound()).min(self.least_cutout_bound(surface));
         let own = own.min(self.maximum);
-        let constant = self.constant_size(surface);
         if own >= self.maximum && matches!(shape, csg::Surface::Plane(_)) {
             return false;
         }
@@ -402,7 +416,7 @@ impl Sampler<'_> {
             |cutout: &Cutout| cutout.surface == surface && is_in(cutout, -step) != is_in(cutout, step);
         let cutout = (0..).zip(&self.geometry.cutouts).find(|(_, cutout)| is_here(cutout)).map(|(i, _)| i);
         let bounds = self.body_bounds.iter().filter(|(body, _)| sides.contains(&Some(*body)));
-        let on_surface = self.size_on(surface, point).min(self.cutout_bound(cutout));
+        let on_surface = self.size_within(surface, point).min(self.cutout_bound(cutout));
         Some(bounds.map(|(_, b)| *b).fold(on_surface, f64::min))
     }
 }
