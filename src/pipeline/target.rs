@@ -115,7 +115,7 @@ pub fn mesh_to_target(
         if count < target {
             search.coarse = Some((scale, count as f64));
         } else {
-            let share = estimate.and_then(|estimate| estimate.share_at(LARGEST_SCALE));
+            let share = estimate.and_then(|estimate| estimate.share_at(LARGEST_SCALE, f64::INFINITY));
             if search.too_many(scale, made, share) {
                 break;
             }
