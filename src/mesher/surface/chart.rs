@@ -392,6 +392,33 @@ impl Chart {
         )
     }
 
+    /// The vector from one site to another on the unrolled surface, with angles and lengths nearly
+    /// those on the surface up to a common factor; `None` for poles, and in charts that are not
+    /// unrolled.
+    pub fn unrolled(&self, from: &Site, to: &Site) -> Option<[f64; 2]> {
+        if self.is_pole(from) || self.is_pole(to) {
+            return None;
+        }
+        let radius = 0.5 * (self.radii[0] + self.radii[1]);
+        let turned = TAU * wrap(to[0] - from[0]);
+        let (along, turned_along) = (to[1] - from[1], TAU * wrap(to[1] - from[1]));
+        match self.shape {
+            Shape::Straight => Some([radius * turned, along]),
+            // Along the axis the cone is longer than the change of its radius.
+            Shape::Conic { rate, .. } => Some([turned, along * (1.0 / (rate * radius)).hypot(1.0)]),
+            Shape::Hose(sweep) => {
+                let [a, b] = section_ellipse(&sweep).radii;
+                Some([0.5 * (a + b) * turned, along])
+            }
+            Shape::Around { major } => Some([major * turned, radius * turned_along]),
+            Shape::Tube { profile } => {
+                let [a, b] = profile.radii;
+                Some([profile.center[0] * turned, 0.5 * (a + b) * turned_along])
+            }
+            Shape::Flat | Shape::Central | Shape::Capped { .. } | Shape::Strip(_) => None,
+        }
+    }
+
     /// The point of the surface at the midpoint of a chart edge, up to rounding; `None` if
     /// [`point`](Self::point) has none.
     pub fn middle(&self, a: &Site, b: &Site) -> Option<Point> {

@@ -19,7 +19,7 @@ const ACCEPTABLE: f64 = 2.0;
 /// Vertices with at most this many neighbours are collapsed if that makes nothing worse.
 const FEW: usize = 4;
 
-/// Additional rounds while triangles are folded. One has always been enough if the segments allow
+/// Additional rounds while triangles are folded. One is nearly always enough if the segments allow
 /// unfolding.
 const MORE_ROUNDS: usize = 4;
 
@@ -41,6 +41,10 @@ pub(super) fn improve(sheet: &mut Sheet, settings: &Settings) -> Result<Improved
     for round in 0..settings.rounds + MORE_ROUNDS {
         if round >= settings.rounds && !sheet.mesh.living().any(|t| sheet.price_at(t) > NORMAL_PRICE) {
             break;
+        }
+        if round >= settings.rounds {
+            done.swaps += sheet.unfold();
+            done.swaps += sheet.legalise_all();
         }
         if round + 1 != settings.rounds {
             done.collapses += collapse_all(sheet);

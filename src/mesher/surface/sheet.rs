@@ -263,8 +263,34 @@ impl<'a> Sheet<'a> {
         (0..3).filter(|&i| straight(i)).count()
     }
 
+    /// The shape of a triangle on the unrolled surface, as in [`price`](Self::price); infinite if the
+    /// chart is not unrolled there.
+    fn unrolled_price(&self, v: [u32; 3], _: [u32; 3]) -> f64 {
+        let site = |k: usize| &self.nodes[v[k] as usize].site;
+        let edge = |from: usize, to: usize| self.chart.unrolled(site(from), site(to));
+        let (Some([x1, y1]), Some([x2, y2])) = (edge(0, 1), edge(0, 2)) else { return f64::INFINITY };
+        let squares = x1 * x1 + y1 * y1 + x2 * x2 + y2 * y2 + (x2 - x1).powi(2) + (y2 - y1).powi(2);
+        (squares / (x1 * y2 - x2 * y1)).abs().min(DEGENERATE_PRICE)
+    }
+
     /// Swaps the diagonal at a side if that lowers the price and is valid in the chart.
     pub fn try_flip(&mut self, t: u32, i: usize) -> bool {
+        self.flip_for(t, i, Self::price_of)
+    }
+
+    /// Swaps diagonals of folded triangles and beside them until they are Delaunay on the unrolled
+    /// surface; returns the number of swaps.
+    ///
+    /// Where the surface bends sharply, swaps by the price can end with triangles that connect its
+    /// two sides through the inside: each single swap would raise the price. On the unrolled surface
+    /// swaps always end with the Delaunay triangulation.
+    pub fn unfold(&mut self) -> usize {
+        let folded: Vec<u32> = self.mesh.living().filter(|&t| self.price_at(t) > NORMAL_PRICE).collect();
+        self.flip_all(folded, |sheet, t, i| sheet.flip_for(t, i, Self::unrolled_price))
+    }
+
+    /// Swaps the diagonal at a side if that lowers the sum of a price and is valid in the chart.
+    fn flip_for(&mut self, t: u32, i: usize, price: impl Fn(&Self, [u32; 3], [u32; 3]) -> f64) -> bool {
         let x = *self.mesh.at(t);
         if x.segment[i] != NONE || x.near[i] == NONE {
             return false;
@@ -275,9 +301,10 @@ impl<'a> Sheet<'a> {
         if [p, a, b, d].iter().any(|&v| self.nodes[v as usize].kind == Kind::Outside) {
             return false;
         }
-        let before = self.price_of(x.v, x.segment) + self.price_of(y.v, y.segment);
-        let after = self.price_of([p, a, d], [y.segment[next(j)], NONE, x.segment[last(i)]])
-            + self.price_of([p, d, b], [y.segment[last(j)], x.segment[next(i)], NONE]);
+        let before = price(self, x.v, x.segment) + price(self, y.v, y.segment);
+        let after = price(self, [p, a, d], [y.segment[next(j)], NONE, x.segment[last(i)]])
+            + price(self, [p, d, b], [y.segment[last(j)], x.segment[next(i)], NONE]);
+        // Also if both are infinite.
         if after >= before * (1.0 - GAIN) || !self.fits(p, a, d) || !self.fits(p, d, b) {
             return false;
         }
@@ -305,8 +332,16 @@ impl<'a> Sheet<'a> {
 
     /// Swaps diagonals everywhere until none gains; returns the number of swaps.
     pub fn legalise_all(&mut self) -> usize {
-        let mut queue: std::collections::VecDeque<u32> = self.mesh.living().collect();
-        let mut waiting = vec![true; self.mesh.triangles.len()];
+        let all = self.mesh.living().collect();
+        self.flip_all(all, Self::try_flip)
+    }
+
+    /// Swaps diagonals at the sides of some triangles, and then beside those that changed, until
+    /// `flip` swaps none; returns the number of swaps.
+    fn flip_all(&mut self, first: Vec<u32>, flip: impl Fn(&mut Self, u32, usize) -> bool) -> usize {
+        let mut waiting = vec![false; self.mesh.triangles.len()];
+        first.iter().for_each(|&t| waiting[t as usize] = true);
+        let mut queue = std::collections::VecDeque::from(first);
         let mut swaps = 0;
         while let Some(t) = queue.pop_front() {
             waiting[t as usize] = false;
@@ -316,7 +351,7 @@ impl<'a> Sheet<'a> {
                 if u != NONE && waiting[u as usize] {
                     continue;
                 }
-                if self.try_flip(t, i) {
+                if flip(self, t, i) {
                     swaps += 1;
                     for s in [t, u] {
                         if !std::mem::replace(&mut waiting[s as usize], true) {

@@ -1,7 +1,7 @@
 //! Surface meshes of geometries given by a few lines of text.
 
 use super::*;
-use crate::ground::size::{GeometricSize, SizeSettings, UniformSize};
+use crate::ground::size::{GeometricSize, Preset, SizeSettings, UniformSize};
 use crate::mesher::surface::curves::{crowded, mesh_curves};
 use crate::mesher::surface::narrow::narrow;
 
@@ -42,6 +42,27 @@ tlo c;",
     });
     let shortest = sides.fold(f64::INFINITY, f64::min);
     assert!(shortest > 1e-4, "{shortest}");
+}
+
+#[test]
+fn no_triangle_connects_the_sides_of_an_elliptic_cone_through_its_inside() {
+    let (geometry, features, projector) = read(
+        "algebraic3d
+solid c = ellipticcone (0, 0, 0; 2, 0, 0; 0, 1, 0; 0.5; 0.5)
+    and plane (0, 0, 0; 0, 0, -1) and plane (0, 0, 1; 0, 0, 1);
+tlo c;",
+    );
+    let settings = SizeSettings { scale: 0.15, ..Preset::Coarse.into() };
+    let size = GeometricSize::new(&geometry, &features, &settings);
+    let curves = mesh_curves(&features, &projector, &size).expect("curves");
+    let (mesh, _) = mesh_patches(&geometry, &features, curves, &size, &Settings::default()).unwrap();
+    assert_eq!(mesh.check(&features, &projector), []);
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.vertices.map(|v| mesh.points[v.index()]);
+        let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+        let most = 4.0 * size.size_at(&nalgebra::center(&a, &b));
+        assert!(longest < most, "a side of {longest}, where {most} is long, at {a}");
+    }
 }
 
 #[test]
