@@ -80,8 +80,20 @@ pub(super) fn mesh_as_wanted(
         coarse
     };
     let to_target = |tets: u64, pieces: u32, fits: &dyn Fn(u64) -> bool| {
+        // Sizes lowered at some places change the number little: the search goes on from the scale
+        // that it found, or ends with it where no number fits.
+        let mut found = None;
         mend::refinable(model, (pieces * refined, order), budget, |more| {
-            mesh_to_target(model, &mut with(more, pieces), tets, fits, budget, work)
+            let mut coarse = with(more, pieces);
+            let last = found.inspect(|&(scale, _)| coarse.size.scale = scale);
+            let (made, outcome) = match last {
+                Some((_, outcome @ (Outcome::Least | Outcome::Jumped))) => {
+                    (model.coarse_mesh(&mut coarse, budget, work)?, outcome)
+                }
+                _ => mesh_to_target(model, &mut coarse, tets, fits, budget, work)?,
+            };
+            found = Some((coarse.size.scale, outcome));
+            Ok((made, outcome))
         })
     };
     match wanted {
