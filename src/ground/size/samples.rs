@@ -188,7 +188,9 @@ impl Sampler<'_> {
         let curve = self.features.curve(id);
         let at = curve.trace[0];
         let beside = curve.fins.iter().map(|fin| self.features.patch(fin.patch).surface);
-        let size_alone = beside.map(|surface| self.size_on(surface, &at)).fold(self.maximum, f64::min);
+        // A large scale makes sizes larger than the whole geometry.
+        let most = self.maximum.min(self.features.bounds.diagonal());
+        let size_alone = beside.map(|surface| self.size_on(surface, &at)).fold(most, f64::min);
         ShortCurve { curve: id, at, length: length(&curve.trace), size_alone }
     }
 
