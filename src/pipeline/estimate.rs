@@ -90,8 +90,8 @@ impl<'a> Estimate<'a> {
         Some(scale * step(error, slope)).filter(|scale| scale.is_finite())
     }
 
-    /// The expected number of tets at a scale, as a fraction of those of the mesh; infinite if it is
-    /// more than `most`. `None` without a size field.
+    /// The expected number of tets at a scale, as a fraction of those of the mesh; infinite if it
+    /// is more than `most`. `None` without a size field.
     pub fn share_at(&self, scale: f64, most: f64) -> Option<f64> {
         let sizes = at_scale(&self.settings.size, scale, self.own_sources);
         let size = self.model.size_field(&sizes, Evaluation::Rough)?;

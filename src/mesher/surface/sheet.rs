@@ -263,8 +263,7 @@ impl<'a> Sheet<'a> {
         (0..3).filter(|&i| straight(i)).count()
     }
 
-    /// The shape of a triangle on the unrolled surface, as in [`price`](Self::price); infinite if the
-    /// chart is not unrolled there.
+    /// Σl²/area of a triangle on the unrolled surface; infinite if the chart is not unrolled there.
     fn unrolled_price(&self, v: [u32; 3], _: [u32; 3]) -> f64 {
         let site = |k: usize| &self.nodes[v[k] as usize].site;
         let edge = |from: usize, to: usize| self.chart.unrolled(site(from), site(to));
@@ -282,8 +281,8 @@ impl<'a> Sheet<'a> {
     /// surface; returns the number of swaps.
     ///
     /// Where the surface bends sharply, swaps by the price can end with triangles that connect its
-    /// two sides through the inside: each single swap would raise the price. On the unrolled surface
-    /// swaps always end with the Delaunay triangulation.
+    /// two sides through the inside: each single swap would raise the price. On the unrolled
+    /// surface swaps always end with the Delaunay triangulation.
     pub fn unfold(&mut self) -> usize {
         let folded: Vec<u32> = self.mesh.living().filter(|&t| self.price_at(t) > NORMAL_PRICE).collect();
         self.flip_all(folded, |sheet, t, i| sheet.flip_for(t, i, Self::unrolled_price))

@@ -34,16 +34,10 @@ impl Table {
         &TABLE
     }
 
-    /// The whole degrees (0 to 179) of the angle with this cosine. A cosine beyond ±1 by rounding
-    /// counts as ±1.
+    /// The whole degrees (0 to 179) of the angle with this cosine, whose [`cell`] this is. A cosine
+    /// beyond ±1 by rounding counts as ±1.
     #[inline(always)]
-    pub fn whole_degrees(&self, cosine: f64) -> usize {
-        self.whole_degrees_in(cell(cosine), cosine)
-    }
-
-    /// The same for a cosine whose [`cell`] is known.
-    #[inline(always)]
-    pub fn whole_degrees_in(&self, cell: u64, cosine: f64) -> usize {
+    pub fn whole_degrees(&self, cell: u64, cosine: f64) -> usize {
         // Both indices are within the tables by their lengths.
         let mut degrees = self.first[cell as usize % (2 * CELLS)];
         // Nearly always zero or one step: the first without a branch.
@@ -92,12 +86,12 @@ mod tests {
 
     #[test]
     fn whole_degrees_are_those_of_the_inverse_cosine() {
-        let table = Table::get();
+        let whole_degrees = |cosine: f64| Table::get().whole_degrees(cell(cosine), cosine);
         for k in 0..=20_000 {
             let angle = (f64::from(k) + 0.5) * 180.0 / 20_001.0;
-            assert_eq!(table.whole_degrees(angle.to_radians().cos()), angle as usize, "{angle}");
+            assert_eq!(whole_degrees(angle.to_radians().cos()), angle as usize, "{angle}");
         }
-        assert_eq!([1.1, 1.0, -1.0, -1.1].map(|cosine| table.whole_degrees(cosine)), [0, 0, 179, 179]);
+        assert_eq!([1.1, 1.0, -1.0, -1.1].map(whole_degrees), [0, 0, 179, 179]);
     }
 
     #[test]

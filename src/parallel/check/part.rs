@@ -42,32 +42,32 @@ const CHUNKS: usize = 1024;
 ///
 /// Matching faces between tets are not checked here but by the [`checksum`](super::checksum()).
 pub fn check_part(stream: &dyn MeshStream, projector: Option<&Projector>, settings: &Settings) -> PartReport {
-    check_all_but_sum(stream, projector, settings, false).0
+    check_all(stream, projector, settings, false).0
 }
 
-/// *Local.* [`check_part`] and the part's [`checksum`](super::checksum()) (of the tets that have all
-/// their vertices), in one pass over the tets.
+/// *Local.* [`check_part`] and the part's [`checksum`](super::checksum()), in one pass over all
+/// tets. Blocks that refer to missing vertices, which are faults, are left out of the checksum.
 pub fn check_part_and_sum(
     stream: &dyn MeshStream,
     projector: Option<&Projector>,
     settings: &Settings,
 ) -> (PartReport, Checksum) {
-    let (report, tets) = check_all_but_sum(stream, projector, settings, true);
+    let (report, tets) = check_all(stream, projector, settings, true);
     (report, checksum::without_tets(stream).plus(tets))
 }
 
-/// Checks this rank's part; also returns the checksum of its tets if `sum`.
-fn check_all_but_sum(
+/// Checks this rank's part; also returns the checksum of its tets, or 0 without.
+fn check_all(
     stream: &dyn MeshStream,
     projector: Option<&Projector>,
     settings: &Settings,
-    sum: bool,
+    with_checksum: bool,
 ) -> (PartReport, Checksum) {
     let mut report = check_vertices(stream, settings);
     let (boundary, sides) = check_boundary(stream, projector, settings);
     report = report.merged(boundary, settings.described);
     check_range(stream, &sides, settings, &mut report);
-    let (tets, checksum) = check_tets(stream, &sides, settings, sum);
+    let (tets, checksum) = check_tets(stream, &sides, settings, with_checksum);
     (report.merged(tets, settings.described), checksum)
 }
 
@@ -192,10 +192,10 @@ fn check_tets(
     stream: &dyn MeshStream,
     sides: &[Side],
     settings: &Settings,
-    sum: bool,
+    with_checksum: bool,
 ) -> (PartReport, Checksum) {
     let check = |scratch: &mut Scratch, range: Range<usize>| {
-        let mut checksum = sum.then(Checksum::default);
+        let mut checksum = with_checksum.then(Checksum::default);
         let (tets, report) = check_chunk(stream, sides, settings, scratch, range, checksum.as_mut());
         (tets, report, checksum.unwrap_or_default())
     };
@@ -324,7 +324,7 @@ fn add_shapes(batch: &Batch, shapes: &Shapes, measures: Measures, report: &mut O
     let [ratios, smallest, largest] = &shapes.bins;
     for lane in 0..batch.len() {
         report.ratios[ratios[lane] as usize] += 1;
-        report.smallest_angles[degrees_of.whole_degrees_in(smallest[lane], shapes.smallest[lane])] += 1;
-        report.largest_angles[degrees_of.whole_degrees_in(largest[lane], shapes.largest[lane])] += 1;
+        report.smallest_angles[degrees_of.whole_degrees(smallest[lane], shapes.smallest[lane])] += 1;
+        report.largest_angles[degrees_of.whole_degrees(largest[lane], shapes.largest[lane])] += 1;
     }
 }

@@ -206,9 +206,8 @@ impl Batch {
         let opposite = [self.edge(1, 2, lane), self.edge(1, 3, lane)];
         // Outward normals, each of the face opposite its corner.
         let normals = [cross(opposite[0], opposite[1]), cross(w, v), cross(u, w), cross(v, u)];
-        // Divisions and roots take most of the time. Squares of cosines, with the sign of the cosine,
-        // are in the same order, so only the extremes need a root; and the inverses of two numbers
-        // take one division.
+        // Divisions and roots take long. Squares of cosines with the sign of the cosine are in the
+        // same order, so only the extremes need a root; two inverses take one division.
         let squares = [square(normals[0]), square(normals[1]), square(normals[2]), square(normals[3])];
         let (first, last) = (1.0 / (squares[0] * squares[1]), 1.0 / (squares[2] * squares[3]));
         let inverse = [first * squares[1], first * squares[0], last * squares[3], last * squares[2]];
