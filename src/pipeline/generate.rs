@@ -178,15 +178,16 @@ fn fill(
     progress: &Progress,
 ) -> Result<Generated, Error> {
     let Parts { model, coarse, sizes, dist, projector, names, pieces } = parts;
+    let linked = Linked::broadcast(comm, coarse.as_ref().map(|made| &made.periodic))?;
     let (part, refused, delivered) = {
         let (wanted, _) = settings.before_refinement();
         let smoothness = smoothness_if_refined(settings, &projector);
         let how = Improvement { settings: &of_effort(settings), smoothness: smoothness.as_deref() };
-        skins::mesh_skins(comm, &dist, (&projector, pieces), sizes.as_deref(), wanted, how, progress)?
+        let sizes = (sizes.as_deref(), &linked.patches());
+        skins::mesh_skins(comm, &dist, (&projector, pieces), sizes, wanted, how, progress)?
     };
-    // The boundary is that of the method `refine`, without lines where cuts meet it.
-    let merge_angle = None;
-    let whole = Whole { model, names, projector, pieces, coarse, refused: Some(refused), delivered };
+    let merge_angle = Some(interfaces::MERGE_ANGLE);
+    let whole = Whole { model, linked, names, projector, pieces, coarse, refused: Some(refused), delivered };
     stored(comm, part, whole, merge_angle, settings, progress)
 }
 
@@ -227,13 +228,15 @@ fn decomposed(
         let how = Improvement { settings: &of_effort(settings), smoothness: smoothness.as_deref() };
         decompose::mesh_pieces(comm, model, cuts, settings, how, progress)?
     };
-    let whole = Whole { model, names, projector, pieces, coarse, refused: None, delivered };
+    let linked = Linked::broadcast(comm, coarse.as_ref().map(|made| &made.periodic))?;
+    let whole = Whole { model, linked, names, projector, pieces, coarse, refused: None, delivered };
     stored(comm, part, whole, Some(interfaces::MERGE_ANGLE), settings, progress)
 }
 
 /// Data that accompanies separately meshed parts.
 struct Whole<'a> {
     model: Option<&'a Model>,
+    linked: Linked,
     names: Names,
     projector: Projector,
     pieces: u32,
@@ -252,8 +255,7 @@ fn stored(
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Generated, Error> {
-    let Whole { model, names, projector, pieces, coarse, refused, delivered } = whole;
-    let linked = Linked::broadcast(comm, coarse.as_ref().map(|made| &made.periodic))?;
+    let Whole { model, linked, names, projector, pieces, coarse, refused, delivered } = whole;
     let (part, across) = progress.stage(Stage::Interfaces, |_| {
         let smoothness = smoothness_if_refined(settings, &projector);
         let across = interfaces::Settings { merge_angle, ..interfaces::Settings::of(measure(settings)) };
@@ -348,7 +350,8 @@ fn coarse_mesh(
         let part = match &sizes {
             Some(sizes) => {
                 let (wanted, _) = settings.before_refinement();
-                skins::partition(mesh, (&faces, pieces), parts, &ties, (sizes, wanted))?
+                let remeshed = model.has_surfaces();
+                skins::partition(mesh, (&faces, pieces), parts, &ties, (sizes, wanted, remeshed))?
             }
             None => partition::partition_matched(mesh, &faces, parts, &ties, None, &Default::default())?,
         };

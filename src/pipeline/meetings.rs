@@ -4,7 +4,7 @@ use super::contacts::{Contact, Contacts, Meeting};
 use super::{CoarseError, FacetSolid};
 use crate::ground::mesh::Touching;
 use crate::ground::size::SizeField;
-use crate::mesher::facets::{Crossing, RemeshSettings, keep, remesh};
+use crate::mesher::facets::{Constraints, Crossing, RemeshSettings, keep, remesh};
 use crate::mesher::surface::SurfaceMesh;
 use csg::PatchId;
 use std::sync::{Mutex, PoisonError};
@@ -81,8 +81,9 @@ impl FacetSolid {
             }
             known.may_meet(a, b)
         };
-        let settings = RemeshSettings::default();
-        let (surface, _) = remesh(&self.model, size, &settings, &|surface| self.snap(surface), &touch)?;
+        let (settings, free) = (RemeshSettings::default(), Constraints::default());
+        let (surface, _) =
+            remesh(&self.model, size, (&settings, &free), &|surface| self.snap(surface), &touch)?;
         let (touching, new) = touching.into_inner().unwrap_or_else(PoisonError::into_inner);
         Ok((surface, touching, new))
     }

@@ -77,6 +77,16 @@ impl Model {
         }
     }
 
+    /// Whether it has surfaces that its meshes approximate. Otherwise its projector is
+    /// [`Projector::Flat`]: the faces of the given mesh are the surface.
+    pub fn has_surfaces(&self) -> bool {
+        match self {
+            Self::Csg(_) => true,
+            Self::Facets(solid) => !solid.keep_surface,
+            Self::Given(_) => false,
+        }
+    }
+
     /// Numbers and names of its bodies and boundaries.
     pub fn names(&self) -> Names {
         match self {

@@ -11,6 +11,8 @@ use crate::ground::mesh::Mesh;
 use crate::ground::mesh::periodic::{self, Link, Pairs, PeriodicMap};
 use crate::parallel::distribution::DistMesh;
 use crate::parallel::repartition::periodic::gather_faces;
+use csg::PatchId;
+use std::collections::HashSet;
 
 /// What all ranks know of periodic faces: the patches, and the distance within which points are
 /// equal.
@@ -38,6 +40,11 @@ impl Linked {
     /// The patches.
     pub fn links(&self) -> &[Link] {
         &self.links
+    }
+
+    /// The patches that are periodic copies or have some.
+    pub fn patches(&self) -> HashSet<PatchId> {
+        self.links.iter().flat_map(|link| [link.of, link.image]).collect()
     }
 
     /// **Collective.** The pairs of the periodic vertices, edges and faces.

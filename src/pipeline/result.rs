@@ -222,11 +222,14 @@ pub struct StraightEdge {
     pub distance: f64,
 }
 
-/// Skins that the mesher could not fill, and that the lattice filled instead.
+/// Skins that the mesher could not fill, so that the lattice filled them, or not remesh.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Refused {
     /// Number of these skins.
     pub skins: u64,
     /// The rank and the error of the first of them.
     pub first: Option<(u32, String)>,
+    /// Number of skins whose triangles on patches stayed those of the lattice, because they could
+    /// not be remeshed.
+    pub kept: u64,
 }

@@ -230,10 +230,17 @@ impl Report {
             let moved = tets(moved);
             writeln!(f, "evened     {moved} went to other parts; the imbalance was {imbalance:.3}")?;
         }
-        if let Some(Refused { skins, first: Some((rank, reason)) }) = &self.skins {
+        if let Some(Refused { skins, first: Some((rank, reason)), .. }) = &self.skins {
             writeln!(
                 f,
                 "skins      {skins} refused by the mesher and filled by the lattice; that of rank {rank}: {reason}"
+            )?;
+        }
+        if let Some(Refused { kept: kept @ 1.., .. }) = &self.skins {
+            let parts = counted(*kept, "part", "parts");
+            writeln!(
+                f,
+                "skins      the boundary of {parts} is that of the refined coarse mesh: it could not be remeshed"
             )?;
         }
         Ok(())

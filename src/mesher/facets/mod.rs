@@ -26,6 +26,7 @@ mod features;
 mod join;
 mod keep;
 mod model;
+mod part;
 #[cfg(test)]
 mod projector_tests;
 mod rays;
@@ -51,9 +52,10 @@ pub use error::FacetError;
 pub use exact::of_brep;
 pub use keep::keep;
 pub use model::{BluntEnd, FacetBody, FacetCurve, FacetModel, FacetPatch, Facets, Marks, Merged, Settings};
+pub use part::SurfacePart;
 #[cfg(test)]
 pub use remesh::deviation;
-pub use remesh::{RemeshReport, RemeshSettings, remesh};
+pub use remesh::{Constraints, Piece, RemeshReport, RemeshSettings, remesh};
 pub use sharp_places::{SharpPlace, SharpPlaces};
 pub use size::{FacetSize, largest_size};
 pub use small::{Grouping, Kept, MergedEdge, MergedFace, MergedSmall, MergedTip, NamedFace, Small, merge};

@@ -4,9 +4,9 @@ use super::samples::{Soup, read_ply, read_stl, shared};
 use super::*;
 use crate::Point;
 use crate::ground::kernel::predicates::{Sign, orient3d};
-use crate::ground::mesh::{Class, Mesh, Segment, TET_EDGES, VertexId};
+use crate::ground::mesh::{BoundaryTriangle, Class, Mesh, Segment, TET_EDGES, VertexId};
 use crate::ground::progress::Work;
-use crate::ground::size::{SizeField, SizeSettings};
+use crate::ground::size::{SizeField, SizeSettings, UniformSize};
 use crate::mesher::surface::SurfaceMesh;
 use crate::mesher::volume::ClosedSurface;
 use crate::mesher::{improve, volume};
@@ -14,7 +14,7 @@ use crate::pipeline::CoarseSettings;
 use crate::pipeline::model::Model;
 use crate::pipeline::retries::Budget;
 use csg::BodyId;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::convert::Infallible;
 
 fn soup(make: impl FnOnce(&mut Soup)) -> Facets {
@@ -29,8 +29,55 @@ fn model(files: &[Facets]) -> FacetModel {
 
 /// The facets remeshed with their vertices on them.
 pub(super) fn remeshed(model: &FacetModel, size: &dyn SizeField) -> (SurfaceMesh, RemeshReport) {
+    constrained(model, size, &Constraints::default())
+}
+
+fn constrained(
+    model: &FacetModel,
+    size: &dyn SizeField,
+    constraints: &Constraints,
+) -> (SurfaceMesh, RemeshReport) {
     let stay = |_: &mut SurfaceMesh| Ok::<(), Infallible>(());
-    remesh(model, size, &RemeshSettings::default(), &stay, &|_| false).unwrap_or_else(|never| match never {})
+    remesh(model, size, (&RemeshSettings::default(), constraints), &stay, &|_| false)
+        .unwrap_or_else(|never| match never {})
+}
+
+/// Curves that are to stay keep their segments, whatever the size.
+#[test]
+fn fixed_curves_are_not_cut() {
+    let model = model(&[soup(|soup| soup.brick([0.0; 3], [1.0; 3], false))]);
+    let curves = || (0..model.curves.len()).map(csg::CurveId::new);
+    let piece = |c: csg::CurveId| Piece { of: Some(c), is_straight: true, is_fixed: c.index() < 3 };
+    let constraints = Constraints { pieces: curves().map(piece).collect(), ..Constraints::default() };
+    let (mesh, _) = constrained(&model, &UniformSize(0.2), &constraints);
+    let segments = |c: csg::CurveId| mesh.segments.iter().filter(|s| s.curve == c).count();
+    let counts: Vec<usize> = curves().map(segments).collect();
+    assert!(counts[..3].iter().all(|&count| count == 1), "{counts:?}");
+    assert!(counts[3..].iter().all(|&count| count > 3), "{counts:?}");
+}
+
+/// The shorter diagonal of a parallelogram is taken, unless another element has it.
+#[test]
+fn taken_edges_are_not_made() {
+    let mut facets = soup(|soup| soup.brick([0.0; 3], [1.0; 3], false));
+    facets.points.iter_mut().for_each(|p| p.x += 0.5 * p.y);
+    let model = model(&[facets]);
+    let edges = |mesh: &SurfaceMesh| -> BTreeSet<[u32; 2]> {
+        let place =
+            |v: VertexId| model.points.iter().position(|p| *p == mesh.points[v.index()]).unwrap() as u32;
+        let sides = |t: &BoundaryTriangle| {
+            let [a, b, c] = t.vertices.map(place);
+            [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)])
+        };
+        mesh.triangles.iter().flat_map(sides).collect()
+    };
+    let before = edges(&keep(&model));
+    let (flipped, _) = constrained(&model, &UniformSize(10.0), &Constraints::default());
+    let taken: HashSet<[u32; 2]> = edges(&flipped).difference(&before).copied().collect();
+    assert_eq!(taken.len(), 2, "at the top and at the bottom");
+    let constraints = Constraints { taken, ..Constraints::default() };
+    let (mesh, _) = constrained(&model, &UniformSize(10.0), &constraints);
+    assert_eq!(edges(&mesh), before);
 }
 
 /// A box 1024 times as long as wide took 40 times as many splits as triangles were left.

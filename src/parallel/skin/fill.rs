@@ -1,5 +1,6 @@
 //! Meshing of the interior of a skin.
 
+use super::remesh::{RemeshError, remeshed};
 use super::{LatticeSkin, Skin, SkinTriangle};
 use crate::ground::mesh::stream::{MeshStream, TetBlock};
 use crate::ground::mesh::{BoundaryTriangle, Class, Mesh, Segment, Touching, VertexId};
@@ -9,7 +10,8 @@ use crate::mesher::improve::{self, Smoothness};
 use crate::mesher::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
 use crate::parallel::distribution::DistMesh;
 use crate::parallel::refine::{self, RefineError, refine};
-use csg::{BodyId, CornerId};
+use csg::{BodyId, CornerId, PatchId};
+use std::collections::HashSet;
 
 /// The tets of a part. Vertices are those of its skin, in their order, then the interior ones.
 #[derive(Clone, Debug, Default)]
@@ -22,6 +24,8 @@ pub struct Filled {
     pub inside: Vec<[f64; 3]>,
     /// The error of the volume mesher if the tets are those of the lattice instead.
     pub refused: Option<FillError>,
+    /// Why the skin was not remeshed, if that failed.
+    pub kept: Option<RemeshError>,
 }
 
 /// How tets are improved.
@@ -46,6 +50,32 @@ pub enum FillError {
     /// Interior edges were split, so the part would not conform to its neighbours.
     #[error("{0} prescribed interior edges were split")]
     CutEdges(usize),
+}
+
+/// *Local.* Remeshes a skin by the size field, except on the patches to `stay`, and fills it; also
+/// returns the remeshed skin. Where that fails, or nothing may be remeshed, [`fill_or_refine`].
+///
+/// # Errors
+/// [`RefineError`] if the lattice is not valid.
+pub fn remesh_and_fill(
+    mesh: &DistMesh,
+    projector: &Projector,
+    skin: &LatticeSkin,
+    (size, stay): (&dyn SizeField, &HashSet<PatchId>),
+    how: Improvement,
+) -> Result<(Option<Skin>, Filled), RefineError> {
+    let remeshed = remeshed(&skin.skin, projector, size, stay).and_then(|remeshed| {
+        let Some(remeshed) = remeshed else { return Ok(None) };
+        let filled = fill(&remeshed, size, how)?;
+        Ok(Some((remeshed, filled)))
+    });
+    let kept = match remeshed {
+        Ok(Some((remeshed, filled))) => return Ok((Some(remeshed), filled)),
+        Ok(None) => None,
+        Err(error) => Some(error),
+    };
+    let filled = fill_or_refine(mesh, projector, skin, size, how)?;
+    Ok((None, Filled { kept, ..filled }))
 }
 
 /// *Local.* [`fill`], or the tets of the lattice if the volume mesher rejects the skin.
@@ -103,6 +133,7 @@ pub fn fill(skin: &Skin, size: &dyn SizeField, how: Improvement) -> Result<Fille
         bodies: made.bodies,
         inside: made.points[skin.points.len()..].iter().map(|p| [p.x, p.y, p.z]).collect(),
         refused: None,
+        kept: None,
     })
 }
 

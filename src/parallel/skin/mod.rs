@@ -20,14 +20,20 @@ mod delivered;
 mod extract;
 mod fill;
 mod number;
+mod remesh;
 mod sizes;
 
+#[cfg(test)]
+mod remesh_tests;
 #[cfg(test)]
 mod tests;
 
 pub use delivered::{DeliveredSizes, delivered};
 pub(crate) use extract::sorted_ends;
 pub use extract::{LatticeSkin, Skin, SkinTriangle, skin};
-pub use fill::{FillError, Filled, Improvement, fill, fill_or_refine};
+#[cfg(test)]
+pub use fill::fill_or_refine;
+pub use fill::{FillError, Filled, Improvement, fill, remesh_and_fill};
 pub use number::number;
+pub use remesh::boundary;
 pub use sizes::{PartSizes, at_vertices, expected_tets, expected_tets_by_part, scatter};

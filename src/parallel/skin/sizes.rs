@@ -141,11 +141,13 @@ const TETS_A_TRIANGLE: f64 = 1.9;
 const LEAST: f64 = 0.2;
 
 /// The numbers of tets that each tet will become if it is in this part, and its `faces` on skins
-/// are split into `pieces`² triangles each, whatever the sizes there.
+/// are split into `pieces`² triangles each, whatever the sizes there: those on interfaces, and
+/// those on patches unless they are `remeshed`.
 pub fn expected_tets_by_part(
     mesh: &Mesh,
     sizes: &[f64],
     (faces, pieces): (&MatchedFaces, u32),
+    remeshed: bool,
     part: &[Rank],
 ) -> Vec<f64> {
     /// The area of an equilateral triangle of edge length 1.
@@ -154,9 +156,12 @@ pub fn expected_tets_by_part(
     let triangles = f64::from(pieces).powi(2);
     for (face, tets) in faces.listed.faces.iter().zip(&faces.tets) {
         let [first, second] = tets.map(|tet| tet as usize);
-        let is_inside =
-            second < part.len() && part[first] == part[second] && mesh.bodies[first] == mesh.bodies[second];
-        if is_inside {
+        let is_kept = if second == u32::MAX as usize {
+            !remeshed
+        } else {
+            part[first] != part[second] || (!remeshed && mesh.bodies[first] != mesh.bodies[second])
+        };
+        if !is_kept {
             continue;
         }
         let [a, b, c] = face.map(|v| mesh.points[v.index()]);

@@ -17,9 +17,9 @@ fn in_threes(fixture: &Fixture, ranks: u32) -> Vec<Rank> {
     (0..fixture.mesh.tets.len() as u32).map(|t| t / 3 % ranks).collect()
 }
 
-fn parts(fixture: &Fixture, ranks: u32) -> Vec<DistMesh> {
-    let rank_of = in_threes(fixture, ranks);
-    let given = |rank| (rank == 0).then(|| (fixture.mesh.clone(), rank_of.clone()));
+pub(super) fn parts(fixture: &Fixture, rank_of: &[Rank]) -> Vec<DistMesh> {
+    let ranks = rank_of.iter().max().map_or(1, |last| last + 1);
+    let given = |rank| (rank == 0).then(|| (fixture.mesh.clone(), rank_of.to_vec()));
     let parts = thread::run(ranks, |comm| distribute(comm, given(comm.rank())).expect("a classified mesh"));
     parts.expect("no rank fails")
 }
@@ -80,7 +80,7 @@ fn both_sides_of_an_interface_have_the_same_triangles() {
     let fixture = ball(1.0);
     let bits = |p: &Point| [p.x, p.y, p.z].map(f64::to_bits);
     let mut seen = BTreeMap::new();
-    for part in parts(&fixture, 3) {
+    for part in parts(&fixture, &in_threes(&fixture, 3)) {
         let skin = skin(&part, &fixture.projector, 4).expect("a skin").skin;
         for triangle in &skin.triangles {
             let mut corners = triangle.vertices.map(|v| bits(&skin.points[v as usize]));
@@ -119,7 +119,7 @@ fn vertices_inside_that_are_corners_are_kept() {
         .find(|&v| matches!(fixture.mesh.classes[v], Class::Body(_)))
         .expect("a vertex inside");
     fixture.mesh.classes[centre] = Class::Corner(csg::CornerId(99));
-    let part = &parts(&fixture, 1)[0];
+    let part = &parts(&fixture, &in_threes(&fixture, 1))[0];
     let skin = skin(part, &fixture.projector, 2).expect("a skin").skin;
     assert_eq!(skin.points.len(), skin.on_triangles + 1);
     assert_eq!(skin.points[skin.on_triangles], fixture.mesh.points[centre]);
@@ -132,7 +132,7 @@ fn vertices_inside_that_are_corners_are_kept() {
 #[test]
 fn sizes_are_linear_between_the_vertices_and_fit_the_mesh_in_the_mean() {
     let fixture = cube(2, false);
-    let part = &parts(&fixture, 1)[0];
+    let part = &parts(&fixture, &in_threes(&fixture, 1))[0];
     let at = |p: &Point| 1.0 + p.x + 2.0 * p.y - 0.5 * p.z;
     let sizes = PartSizes::new(part.points.clone(), part.tets.clone(), part.points.iter().map(at).collect());
     for p in [Point::new(0.3, 0.2, 0.9), Point::new(0.51, 0.77, 0.13), part.points[3]] {
@@ -150,7 +150,7 @@ fn coarse_tets_count_for_the_triangles_of_their_skins() {
     let mesh = cube(3, false).mesh;
     let (sizes, tets) = (vec![0.1; mesh.points.len()], mesh.tets.len());
     let faces = topology::matched_faces(mesh.points.len(), &mesh.tets).expect("a mesh");
-    let by = |part: &[Rank], pieces| expected_tets_by_part(&mesh, &sizes, (&faces, pieces), part);
+    let by = |part: &[Rank], pieces| expected_tets_by_part(&mesh, &sizes, (&faces, pieces), false, part);
     let sum = |counts: &[f64]| counts.iter().sum::<f64>();
     let inside = expected_tets(&mesh, &sizes);
     let outer = |tet: usize| {
@@ -164,6 +164,8 @@ fn coarse_tets_count_for_the_triangles_of_their_skins() {
     let alone: Vec<Rank> = (0..tets as Rank).collect();
     assert!(sum(&by(&alone, 8)) > 2.0 * sum(&one), "each face is on two skins");
     assert!(sum(&by(&alone, 1)) < sum(&inside) && by(&alone, 1).iter().all(|count| *count > 0.0));
+    let remeshed = expected_tets_by_part(&mesh, &sizes, (&faces, 8), true, &vec![0; tets]);
+    assert_eq!(remeshed, inside, "the boundary follows the sizes");
 }
 
 #[test]

@@ -166,6 +166,10 @@ fn keeps_topology(sheet: &Sheet, from: u32, to: u32) -> bool {
                 .iter()
                 .any(|&s| sheet.at(s).v.iter().all(|w| *w == to || (*w != from && v.contains(w))))
     };
+    let is_taken = |&v: &u32| far.binary_search(&v).is_err() && sheet.constraints.is_taken(to, v);
+    if near.iter().any(is_taken) {
+        return false;
+    }
     common == different && apexes.len() == different && sheet.around[from as usize].iter().all(is_new)
 }
 

@@ -116,7 +116,8 @@ fn pair_at(sheet: &Sheet, a: u32, b: u32) -> Option<Flip> {
 /// Whether a flip is possible and an improvement.
 fn improves(sheet: &Sheet, [a, b]: [u32; 2], flip: &Flip) -> bool {
     let ([p, q], [s, t], [left, right]) = (flip.apexes, flip.old, &flip.new);
-    if p == q || sheet.changes.is_flip_in_vain([a, b, p, q]) || sheet.at_edge(p, q).next().is_some() {
+    let is_vain = p == q || sheet.changes.is_flip_in_vain([a, b, p, q]);
+    if is_vain || sheet.at_edge(p, q).next().is_some() || sheet.constraints.is_taken(p, q) {
         return false;
     }
     let before = sheet.value_at(s).min(sheet.value_at(t));

@@ -11,6 +11,7 @@
 
 mod changes;
 mod collapse;
+mod constraints;
 #[cfg(test)]
 mod deviation;
 mod finish;
@@ -22,6 +23,7 @@ mod sheet;
 mod smooth;
 mod split;
 
+pub use constraints::{Constraints, Piece};
 #[cfg(test)]
 pub use deviation::deviation;
 pub use report::RemeshReport;
@@ -107,12 +109,12 @@ const LOWERED: f64 = 0.6;
 pub fn remesh<E: Send>(
     model: &FacetModel,
     size: &dyn SizeField,
-    settings: &RemeshSettings,
+    (settings, constraints): (&RemeshSettings, &Constraints),
     snap: &Snap<E>,
     touch: &Touch,
 ) -> Result<(SurfaceMesh, RemeshReport), E> {
     // In a thread of the pool, so that no call of the pool waits for another thread to wake up.
-    rayon::scope(|_| remesh_in_pool(model, size, settings, snap, touch))
+    rayon::scope(|_| remesh_in_pool(model, size, (settings, constraints), snap, touch))
 }
 
 /// Moves the vertices of a surface mesh.
@@ -124,13 +126,13 @@ type Touch<'a> = dyn Fn(&Crossing) -> bool + Sync + 'a;
 fn remesh_in_pool<E>(
     model: &FacetModel,
     size: &dyn SizeField,
-    settings: &RemeshSettings,
+    (settings, constraints): (&RemeshSettings, &Constraints),
     snap: &Snap<E>,
     touch: &Touch,
 ) -> Result<(SurfaceMesh, RemeshReport), E> {
     let tree = |sources: &[Source]| SourceTree::new(model.bounds, LOWERED_GRADING, f64::INFINITY, sources);
     let sizes = Sizes { wanted: size, turn: FacetSize::of_turn(model, settings.turn), lowered: tree(&[]) };
-    let mut sheet = Sheet::new(model, sizes);
+    let mut sheet = Sheet::new(model, sizes, constraints);
     let mut lowered = Vec::new();
     let mut report = RemeshReport::default();
     let (mut before, mut worse) = (usize::MAX, 0);

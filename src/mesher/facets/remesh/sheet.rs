@@ -1,8 +1,8 @@
 //! The triangles during remeshing, with any number of them at an edge.
 
-use super::Sizes;
 use super::changes::Changes;
 use super::polyline::Polyline;
+use super::{Constraints, Sizes};
 use crate::Point;
 use crate::ground::kernel::simplex::area_vector;
 use crate::ground::projector::facets::FacetProjector;
@@ -61,6 +61,8 @@ pub(super) struct Sheet<'a> {
     pub around: Vec<Vec<u32>>,
     pub triangles: Vec<Triangle>,
     pub polylines: Vec<Polyline>,
+    /// What must stay.
+    pub constraints: &'a Constraints,
     /// Whether each curve is straight.
     pub straight: Vec<bool>,
     /// What has changed.
@@ -78,7 +80,7 @@ const FITTING_COSINE: f64 = 0.5;
 const FITTING_DISTANCE: f64 = 0.21;
 
 impl<'a> Sheet<'a> {
-    pub fn new(model: &'a FacetModel, size: Sizes<'a>) -> Self {
+    pub fn new(model: &'a FacetModel, size: Sizes<'a>, constraints: &'a Constraints) -> Self {
         let mesh = crate::mesher::facets::keep(model);
         let mut kinds = vec![Kind::Corner(CornerId(0)); mesh.points.len()];
         let mut triangles: Vec<Triangle> = mesh
@@ -110,12 +112,27 @@ impl<'a> Sheet<'a> {
         for (i, &v) in model.corners.iter().enumerate() {
             kinds[v as usize] = Kind::Corner(CornerId::new(i));
         }
-        let straight =
-            (0..polylines.len()).map(|c| model.projector.is_straight_curve(CurveId::new(c))).collect();
+        let is_straight = |c: usize| match constraints.pieces.get(c) {
+            Some(piece) => piece.of.is_none() || piece.is_straight,
+            None => model.projector.is_straight_curve(CurveId::new(c)),
+        };
+        let straight = (0..polylines.len()).map(is_straight).collect();
         let sizes = mesh.points.par_iter().map(|p| size.size_at(p)).collect();
         let changes = Changes::new(mesh.points.len());
         let points = mesh.points;
-        Self { model, size, points, kinds, sizes, around, triangles, polylines, straight, changes }
+        Self {
+            model,
+            size,
+            points,
+            kinds,
+            sizes,
+            around,
+            triangles,
+            polylines,
+            constraints,
+            straight,
+            changes,
+        }
     }
 
     /// Re-evaluates the sizes at all vertices.
@@ -245,8 +262,8 @@ impl<'a> Sheet<'a> {
     /// Whether two sides are on one curve that is not straight.
     pub fn flattens(&self, curve: [u32; 3]) -> bool {
         (0..3).any(|k| {
-            let c = curve[k];
-            c != NONE && c == curve[(k + 1) % 3] && !self.straight[c as usize]
+            let [c, d] = [curve[k], curve[(k + 1) % 3]];
+            c != NONE && d != NONE && !self.straight[c as usize] && self.constraints.are_of_one_curve(c, d)
         })
     }
 

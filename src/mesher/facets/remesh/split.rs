@@ -36,6 +36,9 @@ fn longer(sheet: &Sheet, long: f64) -> Vec<(f64, u32, u32)> {
         for side in 0..3 {
             let (a, b) = (t.v[(side + 1) % 3], t.v[(side + 2) % 3]);
             let length = sheet.length(a, b);
+            if sheet.constraints.is_fixed(t.curve[side]) {
+                continue;
+            }
             if length > long || turns_far(sheet, a, b, t.curve[side]) {
                 found.push((length, a.min(b), a.max(b)));
             }
