@@ -10,6 +10,7 @@ use crate::ground::size::SizeField;
 use crate::parallel::distribution::DistMesh;
 use crate::{Point, Vector};
 use csg::Aabb;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// A size field that is linear on the coarse tets of a part.
 pub struct PartSizes {
@@ -20,7 +21,21 @@ pub struct PartSizes {
     /// By tet.
     weights: Vec<Weights>,
     tets: Tree,
+    /// The tet in which each thread found its last point.
+    last: [Hint; HINTS],
 }
+
+/// Threads with the same remainder share a hint.
+const HINTS: usize = 16;
+
+/// A tet to look at first, in a cache line of its own.
+#[derive(Default)]
+#[repr(align(64))]
+struct Hint(AtomicU32);
+
+/// A point is clearly inside a tet, and in no other one, if all its barycentric coordinates are
+/// above this.
+const CLEAR: f64 = 1e-9;
 
 /// Barycentric coordinates in a tet as functions of the point: gradients of the coordinates of the
 /// last three corners, and the first corner, where these are zero.
@@ -50,7 +65,7 @@ impl PartSizes {
         let corners = |tet: &[VertexId; 4]| tet.map(|v| points[v.index()]);
         let boxes: Vec<Aabb> = coarse.iter().map(|tet| bounds(&corners(tet))).collect();
         let weights = coarse.iter().map(|tet| Weights::of(&corners(tet))).collect();
-        Self { weights, tets: Tree::new(&boxes), points, coarse, sizes }
+        Self { weights, tets: Tree::new(&boxes), points, coarse, sizes, last: Default::default() }
     }
 
     /// Multiplies all sizes by a factor.
@@ -66,9 +81,21 @@ impl PartSizes {
     /// The coarse tet that contains a point, or the nearest one (near a curved boundary the refined
     /// skin is outside the coarse tets). `None` if there are no tets.
     pub fn tet_at(&self, point: &Point) -> Option<u32> {
-        let is_inside = |tet: u32| self.weights[tet as usize].at(point).iter().all(|&w| w >= 0.0);
+        let is_inside = |tet: u32, least: f64| {
+            self.weights
+                .get(tet as usize)
+                .is_some_and(|weights| weights.at(point).iter().all(|&w| w >= least))
+        };
+        // Most points are near the one before.
+        let last = &self.last[rayon::current_thread_index().unwrap_or(0) % HINTS].0;
+        let hint = last.load(Ordering::Relaxed);
+        if is_inside(hint, CLEAR) {
+            return Some(hint);
+        }
+        let found = self.tets.find(point, |tet| is_inside(tet, 0.0));
+        found.inspect(|&tet| last.store(tet, Ordering::Relaxed));
         let nearest = || Some(self.tets.nearest(point, |tet| self.squared_distance(point, tet))?.0);
-        self.tets.find(point, is_inside).or_else(nearest)
+        found.or_else(nearest)
     }
 
     fn squared_distance(&self, point: &Point, tet: u32) -> f64 {

@@ -145,6 +145,24 @@ fn sizes_are_linear_between_the_vertices_and_fit_the_mesh_in_the_mean() {
     assert!((mean(&flat) - mean(&field)).abs() < 1e-12);
 }
 
+/// What a point gets does not depend on the points before it.
+#[test]
+fn sizes_do_not_depend_on_the_order_of_points() {
+    let fixture = ball(1.0);
+    let part = &parts(&fixture, &in_threes(&fixture, 1))[0];
+    let new = || {
+        let sizes = (0..part.points.len()).map(|v| 1.0 + 0.1 * v as f64).collect();
+        PartSizes::new(part.points.clone(), part.tets.clone(), sizes)
+    };
+    let (often, corners) = (new(), &part.points);
+    for (i, p) in corners.iter().enumerate() {
+        for q in &corners[..i] {
+            let point = nalgebra::center(p, q);
+            assert_eq!(often.size_at(&point).to_bits(), new().size_at(&point).to_bits(), "{point}");
+        }
+    }
+}
+
 #[test]
 fn coarse_tets_count_for_the_triangles_of_their_skins() {
     let mesh = cube(3, false).mesh;
