@@ -186,9 +186,8 @@ fn fill(
         let sizes = (sizes.as_deref(), &linked.patches());
         skins::mesh_skins(comm, &dist, (&projector, pieces), sizes, wanted, how, progress)?
     };
-    let merge_angle = Some(interfaces::MERGE_ANGLE);
     let whole = Whole { model, linked, names, projector, pieces, coarse, refused: Some(refused), delivered };
-    stored(comm, part, whole, merge_angle, settings, progress)
+    stored(comm, part, whole, settings, progress)
 }
 
 /// How the tets of separately meshed parts are improved.
@@ -230,7 +229,7 @@ fn decomposed(
     };
     let linked = Linked::broadcast(comm, coarse.as_ref().map(|made| &made.periodic))?;
     let whole = Whole { model, linked, names, projector, pieces, coarse, refused: None, delivered };
-    stored(comm, part, whole, Some(interfaces::MERGE_ANGLE), settings, progress)
+    stored(comm, part, whole, settings, progress)
 }
 
 /// Data that accompanies separately meshed parts.
@@ -251,14 +250,13 @@ fn stored(
     comm: &dyn Communicator,
     part: BareMesh,
     whole: Whole,
-    merge_angle: Option<f64>,
     settings: &GenerateSettings,
     progress: &Progress,
 ) -> Result<Generated, Error> {
     let Whole { model, linked, names, projector, pieces, coarse, refused, delivered } = whole;
     let (part, across) = progress.stage(Stage::Interfaces, |_| {
         let smoothness = smoothness_if_refined(settings, &projector);
-        let across = interfaces::Settings { merge_angle, ..interfaces::Settings::of(measure(settings)) };
+        let across = interfaces::Settings::of(measure(settings));
         interfaces::improve_across(comm, part, linked.links(), &across, smoothness.as_deref())
     })?;
     let (part, evened) = even_out(comm, part, linked.links(), progress)?;
