@@ -83,7 +83,7 @@ pub(super) fn rework(
 
 /// A connected set of tets as a mesh of its own. Vertices on its surface and on the boundary come
 /// first, then interior ones, which may move.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Region {
     /// The tets in the part.
     replaced_tets: Vec<u32>,
@@ -198,7 +198,8 @@ fn regions(part: &BareMesh, replaced_tets: &[(u32, Rank)]) -> Vec<Region> {
 }
 
 impl Region {
-    /// Improves the region and determines the destination of each tet.
+    /// Improves the region and determines the destination of each tet. Merging ends before a turn
+    /// after which refinement would flatten or invert more than before.
     fn rework(&mut self, settings: &Settings, smoothness: Option<&dyn Smoothness>) {
         let corners = |tet: &[VertexId; 4]| tet.map(|v| self.mesh.points[v.index()]);
         let sharpest = self.mesh.tets.iter().map(|tet| largest_cosine(&corners(tet))).fold(-1.0, f64::max);
@@ -207,21 +208,35 @@ impl Region {
         let how = improve::Settings { least_angle, reconnection_steps, ..settings.improve.clone() };
         let before =
             PartSizes::new(self.mesh.points.clone(), self.mesh.tets.clone(), usual_lengths(&self.mesh));
-        self.improve(&before, &how, smoothness);
+        let mut faults = self.improve(&before, &how, smoothness);
         let turns = settings.merge_angle.into_iter().flat_map(|angle| [angle; TURNS]);
         for angle in turns {
+            let unmerged = smoothness.map(|_| self.clone());
             if !self.merge(angle) {
                 break;
             }
-            self.improve(&before, &how, smoothness);
+            let after = self.improve(&before, &how, smoothness);
+            if let Some(unmerged) = unmerged.filter(|_| after > faults) {
+                *self = unmerged;
+                break;
+            }
+            faults = after;
         }
         self.ranks = destinations(&self.mesh, &before, &self.ranks);
     }
 
-    fn improve(&mut self, sizes: &PartSizes, how: &improve::Settings, smoothness: Option<&dyn Smoothness>) {
+    /// Improves the tets; returns the number of triangles and tets that refinement would flatten or
+    /// invert.
+    fn improve(
+        &mut self,
+        sizes: &PartSizes,
+        how: &improve::Settings,
+        smoothness: Option<&dyn Smoothness>,
+    ) -> usize {
         let segment = |(ends, class): (&[u32; 2], &Class)| Segment::of_class(ends.map(VertexId), *class);
         self.mesh.segments = self.edges.iter().filter_map(segment).collect();
-        improve::improve_for(&mut self.mesh, sizes, smoothness, how);
+        let report = improve::improve_for(&mut self.mesh, sizes, smoothness, how);
+        report.illegal_triangles + report.illegal_left + report.folding_left
     }
 
     /// Merges boundary vertices; returns whether any were merged.
