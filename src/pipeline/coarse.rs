@@ -215,6 +215,11 @@ pub(super) fn mesh_surface(
     }
 }
 
+/// The number of tets that a size field lets expect, see [`expected::tets`].
+pub(super) fn expected_tets(model: &CsgModel, size: &dyn SizeField, few: f64) -> f64 {
+    expected::tets(&model.features.bounds, size, few, || |p: &Point| model.contains(p))
+}
+
 fn attempt(
     model: &CsgModel,
     initial: &Initial,
@@ -228,7 +233,7 @@ fn attempt(
     let periodic = PeriodicSize::new(own, features, settings.size.grading);
     let size: &dyn SizeField = if features.identified.is_empty() { own } else { &periodic };
     let size = &WatchedSize::new(size, work);
-    let expected = expected::tets(&features.bounds, size, expected::FEW, || |p: &Point| model.contains(p));
+    let expected = expected_tets(model, size, expected::FEW);
     if let Err(error) = budget.expect(expected, work) {
         return Attempt::Failed(error.into());
     }

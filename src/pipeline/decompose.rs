@@ -13,8 +13,7 @@ use super::periodic::periodic_map;
 use super::result::CoarseResult;
 use super::retries::{Budget, CORRECTIONS};
 use super::room;
-use super::settings::Wanted;
-use super::settings::{CutSettings, GenerateSettings};
+use super::settings::{CutSettings, GenerateSettings, Request, Wanted};
 use super::skins::wanted_sizes;
 use super::target::Outcome;
 use super::wanted::mesh_as_wanted;
@@ -67,10 +66,11 @@ pub(super) fn mesh_pieces(
     how: Improvement,
     progress: &Progress,
 ) -> Result<Pieces, Error> {
-    let wanted = settings.before_refinement();
+    let request = settings.before_refinement();
     let plan = decompose::PlanSettings { together: settings.periodic_together, ..cuts.plan };
     let cuts = CutSettings { plan, ..cuts.clone() };
-    let planned = model.map(|model| plan_cuts(comm.size(), model, &cuts, &settings.coarse, wanted, progress));
+    let planned =
+        model.map(|model| plan_cuts(comm.size(), model, &cuts, &settings.coarse, request, progress));
     let planned = comm.agree(planned.transpose())?;
     let mut numbers = planned.as_ref().map_or(vec![0.0, 0.0], |planned| {
         let expected = skin::expected_tets(&planned.coarse.mesh, &planned.sizes).iter().sum();
@@ -78,7 +78,7 @@ pub(super) fn mesh_pieces(
     });
     comm.broadcast(0, &mut numbers)?;
     let [pieces, expected] = numbers[..] else { panic!("rank 0 sent two numbers") };
-    let mut goal = Goal::new(wanted.0, expected);
+    let mut goal = Goal::new(request.wanted, expected);
     loop {
         let skins = planned.as_ref().map(|planned| planned.skins(comm.size(), goal.scale, progress));
         let skins = comm.agree(skins.transpose())?;
@@ -133,7 +133,8 @@ pub fn planned(
 ) -> Result<Planned, Error> {
     options::refuse_planes(&cuts.planes)?;
     options::refuse_impossible_coarse(settings, wanted)?;
-    plan_cuts(parts, &geometry.model, cuts, settings, (wanted, 1), progress)
+    let request = Request { wanted, refined: 1, accepted: Request::FILLED };
+    plan_cuts(parts, &geometry.model, cuts, settings, request, progress)
 }
 
 fn plan_cuts(
@@ -141,7 +142,7 @@ fn plan_cuts(
     model: &Model,
     cuts: &CutSettings,
     settings: &CoarseSettings,
-    (wanted, refined): (Wanted, u32),
+    request: Request,
     progress: &Progress,
 ) -> Result<Planned, Error> {
     let Model::Csg(whole) = model else {
@@ -150,8 +151,8 @@ fn plan_cuts(
     options::refuse_unresolved(model, &settings.size)?;
     room::refuse_too_fine(model, &settings.size, None)?;
     let (pieces, coarse, outcome) = progress.stage(Stage::Mesh, |work| {
-        let budget = Budget::new(None, matches!(wanted, Wanted::Sizes { .. }));
-        mesh_as_wanted(parts, model, settings, (wanted, refined), &[], &budget, work)
+        let budget = Budget::new(None, matches!(request.wanted, Wanted::Sizes { .. }));
+        mesh_as_wanted(parts, model, settings, request, &[], &budget, work)
     })?;
     progress.stage(Stage::Cut, |_| {
         let sizes = wanted_sizes(model, &coarse.mesh, &settings.size, pieces);

@@ -259,13 +259,18 @@ impl FacetSolid {
         FacetSize::evaluated(&self.model, settings, evaluation)
     }
 
+    /// The number of tets that a size field lets expect, see [`expected::tets`].
+    pub(super) fn expected_tets(&self, size: &dyn SizeField, few: f64) -> f64 {
+        expected::tets(&self.model.bounds, size, few, || {
+            let bodies = FacetBodies::new(&self.model);
+            move |p: &Point| bodies.contain(p)
+        })
+    }
+
     fn attempt(&self, settings: &CoarseSettings, allowed: Allowed, budget: &Budget, work: &Work) -> Attempt {
         let own = self.size_field(&settings.size, Evaluation::Fine);
         let size = WatchedSize::new(&own, work);
-        let expected = expected::tets(&self.model.bounds, &size, expected::FEW, || {
-            let bodies = FacetBodies::new(&self.model);
-            move |p: &Point| bodies.contain(p)
-        });
+        let expected = self.expected_tets(&size, expected::FEW);
         if let Err(error) = budget.expect(expected, work) {
             return Attempt::Failed(error.into());
         }

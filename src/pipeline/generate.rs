@@ -180,7 +180,7 @@ fn fill(
     let Parts { model, coarse, sizes, dist, projector, names, pieces } = parts;
     let linked = Linked::broadcast(comm, coarse.as_ref().map(|made| &made.periodic))?;
     let (part, refused, delivered) = {
-        let (wanted, _) = settings.before_refinement();
+        let wanted = settings.before_refinement().wanted;
         let smoothness = smoothness_if_refined(settings, &projector);
         let how = Improvement { settings: &of_effort(settings), smoothness: smoothness.as_deref() };
         let sizes = (sizes.as_deref(), &linked.patches());
@@ -347,7 +347,7 @@ fn coarse_mesh(
         let ties = if parts > 1 { partition::periodic_ties(mesh, &faces, &map) } else { Ties::default() };
         let part = match &sizes {
             Some(sizes) => {
-                let (wanted, _) = settings.before_refinement();
+                let wanted = settings.before_refinement().wanted;
                 let remeshed = model.has_surfaces();
                 skins::partition(mesh, (&faces, pieces), parts, &ties, (sizes, wanted, remeshed))?
             }

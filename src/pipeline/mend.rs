@@ -53,7 +53,8 @@ const MOST_BENT: usize = 100;
 
 /// Makes coarse meshes with `make`, which receives the sources where sizes must be lowered, until
 /// the lattice of `pieces` subdivisions an edge has neither invalid nor poor children. If some
-/// remain, edges of the best mesh are curved. The second value of `make` is passed through.
+/// remain, edges of the best mesh are curved. The second value of `make` is passed through. A mesh
+/// whose number of tets is of no use is returned as it is, unless one before was of use.
 ///
 /// # Errors
 /// The last failure.
@@ -61,6 +62,7 @@ pub fn refinable<T>(
     model: &Model,
     (pieces, order): (u32, Order),
     budget: &Budget,
+    is_of_use: &dyn Fn(u64) -> bool,
     mut make: impl FnMut(&[Source]) -> Result<(CoarseMesh, T), CoarseError>,
 ) -> Result<(CoarseMesh, T), Error> {
     let how = (pieces.min(TRIED_PIECES / order.degree()), order);
@@ -68,8 +70,15 @@ pub fn refinable<T>(
     let most_rounds = if is_faceted { INVERTED_FACETS } else { INVERTED };
     let mut sources = Vec::new();
     let mut best: Option<(Trial, (CoarseMesh, T))> = None;
+    let bent = |(tried, mut made): (Trial, (CoarseMesh, T))| {
+        bend(model, &mut made.0, &tried, how)?;
+        Ok(made)
+    };
     for round in 0.. {
         let mut made = make(&sources)?;
+        if !is_of_use(made.0.report.tets) {
+            return best.map_or(Ok(made), bent);
+        }
         made.0.report.size_corrections += round;
         let mut tried = refinement_test(model, &made.0, how)?;
         if is_faceted && !tried.inverted.is_empty() {
@@ -99,10 +108,9 @@ pub fn refinable<T>(
             };
         }
         if (round >= POOR || budget.is_spent())
-            && let Some((tried, mut made)) = best
+            && let Some(best) = best
         {
-            bend(model, &mut made.0, &tried, how)?;
-            return Ok(made);
+            return bent(best);
         }
     }
     unreachable!("the loop ends by itself")

@@ -8,7 +8,7 @@ use super::geometry::Geometry;
 use super::model::Model;
 use super::options;
 use super::result::Generated;
-use super::settings::{GenerateSettings, Wanted};
+use super::settings::{GenerateSettings, Request, Wanted};
 use crate::ground::comm::Communicator;
 use crate::ground::error::{ErrorKind, HasKind};
 use crate::ground::progress::{Progress, Stage};
@@ -110,12 +110,12 @@ fn merge_small(
     /// The volume of a regular tet with edges of length 1.
     const TET: f64 = 0.118;
     let of_count = |tets: u64| (solid.volume() / (TET * tets.max(1) as f64)).cbrt();
-    let (wanted, pieces) = settings.before_refinement();
+    let Request { wanted, refined, .. } = settings.before_refinement();
     let (largest, pieces) = match wanted {
-        Wanted::Sizes { pieces: own } => (f64::INFINITY, pieces * own),
-        Wanted::Coarse { tets, pieces: own } => (of_count(tets), pieces * own),
+        Wanted::Sizes { pieces: own } => (f64::INFINITY, refined * own),
+        Wanted::Coarse { tets, pieces: own } => (of_count(tets), refined * own),
         // The subdivisions are chosen later: the elements themselves decide.
-        Wanted::Elements(count) => (of_count(count), pieces),
+        Wanted::Elements(count) => (of_count(count), refined),
     };
     // Nodes of second order divide edges, too.
     let pieces = pieces * settings.coarse.order.degree();

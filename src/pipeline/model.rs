@@ -1,8 +1,9 @@
 //! The model: any kind of input of the mesher.
 
-use super::coarse::CoarseSettings;
+use super::coarse::{self, CoarseSettings};
 use super::coarse_error::CoarseError;
 use super::coarse_mesh::{CoarseMesh, CoarseReport};
+use super::expected;
 use super::facet_model::FacetSolid;
 use super::retries::Budget;
 use crate::Point;
@@ -171,6 +172,17 @@ impl Model {
         }
     }
 
+    /// The number of coarse tets that the sizes let expect, 0 if there are few; `None` for an
+    /// existing mesh.
+    pub(super) fn expected_tets(&self, settings: &SizeSettings) -> Option<f64> {
+        let size = self.size_field(settings, Evaluation::Rough)?;
+        match self {
+            Self::Csg(model) => Some(coarse::expected_tets(model, &*size, expected::FEW)),
+            Self::Facets(solid) => Some(solid.expected_tets(&*size, expected::FEW)),
+            Self::Given(_) => None,
+        }
+    }
+
     /// Makes a coarse mesh with the given sizes, see [`coarse::mesh`](super::coarse::mesh). An
     /// existing mesh is used unchanged.
     ///
@@ -183,7 +195,7 @@ impl Model {
         work: &Work,
     ) -> Result<CoarseMesh, CoarseError> {
         match self {
-            Self::Csg(model) => super::coarse::mesh(model, settings, budget, work),
+            Self::Csg(model) => coarse::mesh(model, settings, budget, work),
             Self::Facets(solid) => solid.coarse_mesh(settings, budget, work),
             Self::Given(given) => Ok(given.coarse_mesh()),
         }

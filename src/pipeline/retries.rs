@@ -10,11 +10,11 @@
 //! | `coarse::corrected` | curves or triangles cross, or a body cannot be filled | smaller sizes there | [`CORRECTIONS`] |
 //!
 //! An inner loop runs in each round of the outer ones. Their product would be 26,880 meshes, so all
-//! share a [`Budget`]: a number of meshes, and a number of tets in proportion to the first mesh.
-//! Once it is spent, each loop ends with the best mesh that it has, or with the last error. The
-//! best mesh is the one with the largest smallest dihedral angle; for equal angles their histogram
-//! decides. Budgets count meshes and tets, not seconds, so that results do not depend on the
-//! machine.
+//! share a [`Budget`]: a number of meshes, and a number of tets in proportion to the first mesh or
+//! to a requested number. Once it is spent, each loop ends with the best mesh that it has, or with
+//! the last error. The best mesh is the one with the largest smallest dihedral angle; for equal
+//! angles their histogram decides. Budgets count meshes and tets, not seconds, so that results do
+//! not depend on the machine.
 //!
 //! Nearly all runs need one to ten meshes. Most attempts end early, at the curves or at the
 //! surface: only complete ones take as long as a coarse mesh.
@@ -64,6 +64,8 @@ pub struct Budget {
     meshes: Cell<u32>,
     /// The number of tets that retries may still make; `None` before the first mesh.
     tets: Cell<Option<u64>>,
+    /// The largest number of tets that was requested so far.
+    requested: Cell<u64>,
     /// The memory in bytes; by default the free memory.
     memory: Option<u64>,
     /// The number of tets that was last announced to the user; infinite if none is to be.
@@ -88,6 +90,7 @@ impl Default for Budget {
         Self {
             meshes: Cell::new(MESHES),
             tets: Cell::new(None),
+            requested: Cell::new(0),
             memory: None,
             announced: Cell::new(f64::INFINITY),
             warned: Default::default(),
@@ -131,6 +134,13 @@ impl Budget {
         }
     }
 
+    /// Allows retries for a number of tets that is requested, as if the first mesh had as many.
+    pub(super) fn request(&self, tets: u64) {
+        let more = tets.saturating_sub(self.requested.get());
+        self.requested.set(self.requested.get() + more);
+        self.tets.set(self.tets.get().map(|left| left + RETRIED * more));
+    }
+
     /// Counts a mesh that is begun.
     pub(super) fn spend(&self) {
         self.meshes.set(self.meshes.get().saturating_sub(1));
@@ -139,7 +149,7 @@ impl Budget {
     /// Counts the tets of a complete mesh. The first one sets the number for all retries.
     pub(super) fn made(&self, tets: u64) {
         let left = match self.tets.get() {
-            None => (RETRIED * tets).max(ALWAYS_RETRIED),
+            None => (RETRIED * tets.max(self.requested.get())).max(ALWAYS_RETRIED),
             Some(left) => left.saturating_sub(tets),
         };
         self.tets.set(Some(left));
@@ -183,6 +193,21 @@ mod tests {
     }
 
     #[test]
+    fn retries_may_make_tets_in_proportion_to_the_number_that_is_requested() {
+        let budget = Budget::default();
+        budget.request(50_000);
+        budget.made(1000);
+        let left = |budget: &Budget| budget.tets.get().expect("a mesh was made");
+        assert_eq!(left(&budget), RETRIED * 50_000);
+        budget.request(50_000);
+        assert_eq!(left(&budget), RETRIED * 50_000, "no more for the same number");
+        budget.made(RETRIED * 50_000);
+        assert!(budget.is_spent());
+        budget.request(60_000);
+        assert_eq!(left(&budget), RETRIED * 10_000);
+    }
+
+    #[test]
     fn a_spent_budget_ends_the_search_for_a_number_of_tets_with_the_mesh_that_is_there() {
         let ball = "algebraic3d\nsolid ball = sphere (0, 0, 0; 1);\ntlo ball;\n";
         let geometry = Geometry::from_text(ball).unwrap();
@@ -192,7 +217,7 @@ mod tests {
             mesh_to_target(&geometry.model, &mut settings, 3_000, &fits, budget, Work::unwatched()).unwrap()
         };
         let (budget, small) = (Budget::default(), Budget { meshes: Cell::new(1), ..Budget::default() });
-        let few_tets = Budget { tets: Cell::new(Some(1)), ..Budget::default() };
+        let few_tets = Budget { tets: Cell::new(Some(1)), requested: Cell::new(3_000), ..Budget::default() };
         assert_eq!(search(&budget).1, Outcome::Reached);
         assert!(budget.meshes.get() < MESHES - 1, "one mesh was enough: the test needs another number");
         assert_eq!(search(&small).1, Outcome::Jumped);

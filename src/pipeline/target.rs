@@ -7,6 +7,7 @@ use super::estimate::Estimate;
 use super::model::Model;
 use super::retries::{Budget, TARGETS};
 use crate::ground::progress::Work;
+use crate::ground::size::SizeSettings;
 
 /// Whether a coarse mesh has the requested number of tets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -46,6 +47,13 @@ const LARGEST_SCALE: f64 = 1e3;
 /// [`FAR`], and it grows at least as fast as sizes fall, except near single points.
 const LEAST_STEP: f64 = 1.0 / FAR;
 
+/// More than this many times the goal are too many for a first mesh.
+const TOO_MANY: f64 = 2.0;
+
+/// Maximum number of steps to its scale. The number of tets falls with the third power of the scale
+/// or more slowly, so no step is too long.
+const FIRST_STEPS: usize = 8;
+
 /// A bracket of scales narrower than this factor is not divided further.
 const NARROW: f64 = 1.002;
 
@@ -77,6 +85,7 @@ pub fn mesh_to_target(
     work: &Work,
 ) -> Result<(CoarseMesh, Outcome), CoarseError> {
     let goal = AIM * target as f64;
+    budget.request(target);
     let (sources, grading) = (settings.size.sources.len(), settings.size.grading);
     let mut search = Search::default();
     // The meshes made here, which together may always have as many tets as requested.
@@ -141,6 +150,22 @@ pub fn mesh_to_target(
             Ok((made, outcome))
         }
     }
+}
+
+/// The scale at which a search for this number of tets begins: larger than that of the settings if
+/// their sizes let expect far more tets, because a mesh with these would take longer than all that
+/// follows.
+pub(super) fn first_scale(model: &Model, settings: &SizeSettings, target: u64) -> f64 {
+    let goal = AIM * target as f64;
+    let mut scale = settings.scale;
+    for _ in 0..FIRST_STEPS {
+        match model.expected_tets(&SizeSettings { scale, ..settings.clone() }) {
+            // Such expectations are too low rather than too high: thin bodies have more tets.
+            Some(tets) if tets > TOO_MANY * goal => scale *= (tets / goal).cbrt(),
+            _ => break,
+        }
+    }
+    scale
 }
 
 /// The state of a search for sizes.
