@@ -38,11 +38,12 @@ pub(super) fn mesh_skins(
     let mut goal = Goal::new(wanted, expected);
     let (skin, boundary, filled, delivered) = progress.stage(Stage::Fill, |_| {
         let skin = comm.agree(skin::skin(dist, projector, pieces).map_err(Error::from))?;
+        let free = skin::FreeFaces::of(&skin.skin, projector, stay);
         let mut before = 1.0;
         loop {
             sizes.scale(goal.scale / before);
             before = goal.scale;
-            let made = skin::remesh_and_fill(dist, projector, &skin, (&sizes, stay), how);
+            let made = skin::remesh_and_fill(dist, projector, (&skin, free.as_ref()), &sizes, how);
             let (remeshed, filled) = comm.agree(made.map_err(Error::from))?;
             if goal.is_reached(comm, filled.tets.len())? {
                 let of_lattice = skin.numbering.totals().boundary;

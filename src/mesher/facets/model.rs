@@ -3,13 +3,13 @@
 use super::features::{self, Found};
 use super::join::{self, Joined};
 use super::regions::Regions;
-use super::{FacetError, regions};
+use super::{FacetError, SurfacePart, regions};
 use crate::Point;
 use crate::ground::kernel::tree;
 use crate::ground::mesh::{BoundaryTriangle, Touching, VertexId};
+use crate::ground::projector::facets::FacetProjector;
 use crate::ground::projector::facets::edges::Edges;
 use crate::ground::projector::facets::normals;
-use crate::ground::projector::facets::{FacetProjector, Source};
 use csg::{Aabb, BodyId, CornerId, PatchId};
 
 /// A triangulated surface as read from a file: closed, its triangles in any order.
@@ -226,7 +226,7 @@ impl FacetModel {
             },
             settings,
         );
-        Ok(assemble(joined, &regions, found, bounds, rounding))
+        Ok(assemble(joined, &regions, found))
     }
 
     /// The patch with this id.
@@ -287,7 +287,7 @@ fn keys(joined: &Joined, sides: &[[Option<u32>; 2]]) -> Vec<u32> {
     all.iter().map(|k| different.binary_search(k).unwrap_or(0) as u32).collect()
 }
 
-fn assemble(joined: Joined, regions: &Regions, found: Found, bounds: Aabb, rounding: f64) -> FacetModel {
+fn assemble(joined: Joined, regions: &Regions, found: Found) -> FacetModel {
     let mut patches: Vec<Option<FacetPatch>> = vec![None; found.patches];
     for (t, &patch) in found.patch_of.iter().enumerate() {
         patches[patch as usize].get_or_insert_with(|| {
@@ -307,38 +307,16 @@ fn assemble(joined: Joined, regions: &Regions, found: Found, bounds: Aabb, round
             FacetCurve { ends, vertices: chain.vertices, small: Vec::new() }
         })
         .collect();
-    let mut on_curve: Vec<CornerId> = curves.iter().filter_map(|c| c.ends).flatten().collect();
-    on_curve.sort_unstable();
-    let is_tip = |i: &usize| on_curve.binary_search(&CornerId::new(*i)).is_err();
-    let tips = (0..found.corners.len()).filter(is_tip).map(|i| found.corners[i]).collect();
-    let triangles = joined
-        .triangles
-        .iter()
-        .zip(&found.patch_of)
-        .map(|(v, &p)| BoundaryTriangle { vertices: v.map(VertexId), patch: PatchId(p) })
-        .collect();
-    let projector = FacetProjector::new(Source {
-        points: joined.points.clone(),
-        triangles: joined.triangles,
-        patch_of: found.patch_of,
-        patches: found.patches as u32,
-        curves: curves.iter().map(|c| c.vertices.clone()).collect(),
-        tips,
-    });
-    FacetModel {
+    let triangle =
+        |(v, &p): (&[u32; 3], &u32)| BoundaryTriangle { vertices: v.map(VertexId), patch: PatchId(p) };
+    let surface = SurfacePart {
+        triangles: joined.triangles.iter().zip(&found.patch_of).map(triangle).collect(),
         points: joined.points,
-        triangles,
         corners: found.corners,
         curves,
         patches: patches.into_iter().flatten().collect(),
-        bodies: bodies_of(regions),
-        bounds,
-        projector,
-        merged: None,
-        blunt: Vec::new(),
-        touching: Touching::default(),
-        rounding,
-    }
+    };
+    FacetModel { bodies: bodies_of(regions), ..surface.into() }
 }
 
 fn bodies_of(regions: &Regions) -> Vec<FacetBody> {

@@ -1,6 +1,6 @@
 //! Meshing of the interior of a skin.
 
-use super::remesh::{RemeshError, remeshed};
+use super::remesh::{FreeFaces, RemeshError};
 use super::{LatticeSkin, Skin, SkinTriangle};
 use crate::ground::mesh::stream::{MeshStream, TetBlock};
 use crate::ground::mesh::{BoundaryTriangle, Class, Mesh, Segment, Touching, VertexId};
@@ -10,8 +10,7 @@ use crate::mesher::improve::{self, Smoothness};
 use crate::mesher::volume::{self, ClosedSurface, SurfaceFaults, VolumeError};
 use crate::parallel::distribution::DistMesh;
 use crate::parallel::refine::{self, RefineError, refine};
-use csg::{BodyId, CornerId, PatchId};
-use std::collections::HashSet;
+use csg::{BodyId, CornerId};
 
 /// The tets of a part. Vertices are those of its skin, in their order, then the interior ones.
 #[derive(Clone, Debug, Default)]
@@ -52,27 +51,27 @@ pub enum FillError {
     CutEdges(usize),
 }
 
-/// *Local.* Remeshes a skin by the size field, except on the patches to `stay`, and fills it; also
-/// returns the remeshed skin. Where that fails, or nothing may be remeshed, [`fill_or_refine`].
+/// *Local.* Remeshes the `free` faces of a skin by the size field, and fills it; also returns the
+/// remeshed skin. Where that fails, or no faces are free, [`fill_or_refine`].
 ///
 /// # Errors
 /// [`RefineError`] if the lattice is not valid.
 pub fn remesh_and_fill(
     mesh: &DistMesh,
     projector: &Projector,
-    skin: &LatticeSkin,
-    (size, stay): (&dyn SizeField, &HashSet<PatchId>),
+    (skin, free): (&LatticeSkin, Option<&FreeFaces>),
+    size: &dyn SizeField,
     how: Improvement,
 ) -> Result<(Option<Skin>, Filled), RefineError> {
-    let remeshed = remeshed(&skin.skin, projector, size, stay).and_then(|remeshed| {
-        let Some(remeshed) = remeshed else { return Ok(None) };
+    let in_remeshed = |free: &FreeFaces| {
+        let remeshed = free.remeshed(size)?;
         let filled = fill(&remeshed, size, how)?;
-        Ok(Some((remeshed, filled)))
-    });
-    let kept = match remeshed {
-        Ok(Some((remeshed, filled))) => return Ok((Some(remeshed), filled)),
-        Ok(None) => None,
-        Err(error) => Some(error),
+        Ok((remeshed, filled))
+    };
+    let kept = match free.map(in_remeshed) {
+        Some(Ok((remeshed, filled))) => return Ok((Some(remeshed), filled)),
+        Some(Err(error)) => Some(error),
+        None => None,
     };
     let filled = fill_or_refine(mesh, projector, skin, size, how)?;
     Ok((None, Filled { kept, ..filled }))

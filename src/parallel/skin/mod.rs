@@ -19,8 +19,10 @@
 mod delivered;
 mod extract;
 mod fill;
+mod free;
 mod number;
 mod remesh;
+mod rim;
 mod sizes;
 
 #[cfg(test)]
@@ -35,5 +37,5 @@ pub use extract::{LatticeSkin, Skin, SkinTriangle, skin};
 pub use fill::fill_or_refine;
 pub use fill::{FillError, Filled, Improvement, fill, remesh_and_fill};
 pub use number::number;
-pub use remesh::boundary;
+pub use remesh::{FreeFaces, boundary};
 pub use sizes::{PartSizes, at_vertices, expected_tets, expected_tets_by_part, scatter};

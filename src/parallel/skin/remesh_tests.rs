@@ -1,6 +1,5 @@
 //! Remeshed skins of a cube, a ball and a cylinder.
 
-use super::remesh::remeshed;
 use super::tests::parts;
 use super::*;
 use crate::Point;
@@ -26,6 +25,13 @@ fn in_slabs(fixture: &Fixture, ranks: u32) -> Vec<Rank> {
     rank_of
 }
 
+/// A skin remeshed with edges of this length, except on the patches to `stay`; `None` if nothing
+/// may change.
+fn remeshed(fixture: &Fixture, skin: &Skin, h: f64, stay: &HashSet<PatchId>) -> Option<Skin> {
+    let free = FreeFaces::of(skin, &fixture.projector, stay)?;
+    Some(free.remeshed(&UniformSize(h)).expect("a skin"))
+}
+
 /// Meshes parts inside their remeshed skins; returns the check report.
 fn filled(fixture: &Fixture, n: u32, ranks: u32, h: f64) -> PartReport {
     let rank_of = in_slabs(fixture, ranks);
@@ -34,9 +40,10 @@ fn filled(fixture: &Fixture, n: u32, ranks: u32, h: f64) -> PartReport {
         let part = distribute(comm, mesh).expect("a classified mesh");
         let lattice = skin(&part, &fixture.projector, n).expect("a skin");
         let how = Improvement { settings: &Settings::default(), smoothness: None };
-        let wanted = (&UniformSize(h) as &dyn crate::ground::size::SizeField, &HashSet::new());
+        let free = FreeFaces::of(&lattice.skin, &fixture.projector, &HashSet::new());
+        let of_lattice = (&lattice, free.as_ref());
         let (remeshed, filled) =
-            remesh_and_fill(&part, &fixture.projector, &lattice, wanted, how).expect("tets");
+            remesh_and_fill(&part, &fixture.projector, of_lattice, &UniformSize(h), how).expect("tets");
         assert_eq!((&filled.refused, &filled.kept), (&None, &None), "rank {}", comm.rank());
         let of_lattice = lattice.numbering.totals().boundary;
         let new = remeshed.unwrap_or_else(|| lattice.skin.clone());
@@ -88,8 +95,7 @@ fn both_sides_of_an_interface_keep_their_triangles_and_names() {
     let mut changed = 0;
     for part in parts(&fixture, &in_slabs(&fixture, 3)) {
         let old = skin(&part, &fixture.projector, 4).expect("a skin").skin;
-        let new = remeshed(&old, &fixture.projector, &UniformSize(0.6), &HashSet::new());
-        let new = new.expect("a skin").expect("triangles that may change");
+        let new = remeshed(&fixture, &old, 0.6, &HashSet::new()).expect("triangles that may change");
         let shared = |skin: &Skin| -> Vec<_> {
             let vertex = |(v, holders): (u32, &[Rank])| {
                 (skin.names[v as usize], skin.points[v as usize], skin.classes[v as usize], holders.to_vec())
@@ -129,9 +135,20 @@ fn triangles_across_a_thin_layer_are_no_longer_narrow() {
     let fixture = with_thin_layer();
     let old = skin(&parts(&fixture, &in_slabs(&fixture, 1))[0], &fixture.projector, 4).expect("a skin").skin;
     assert!(smallest_angle(&old) < 6.0);
-    let new = remeshed(&old, &fixture.projector, &UniformSize(0.1), &HashSet::new());
-    let new = new.expect("a skin").expect("triangles that may change");
+    let new = remeshed(&fixture, &old, 0.1, &HashSet::new()).expect("triangles that may change");
     assert!(smallest_angle(&new) > 25.0, "{}", smallest_angle(&new));
+}
+
+/// Otherwise edges beside those would be halved without end, each time into flatter triangles.
+#[test]
+fn edges_that_stay_may_be_much_longer_than_the_wanted_size() {
+    let fixture = cube(2, false);
+    for part in parts(&fixture, &in_slabs(&fixture, 2)) {
+        let old = skin(&part, &fixture.projector, 1).expect("a skin").skin;
+        let new = remeshed(&fixture, &old, 0.06, &HashSet::new()).expect("triangles that may change");
+        assert!(new.triangles.len() > 5 * old.triangles.len(), "{}", new.triangles.len());
+        assert!(smallest_angle(&new) > 10.0, "{}", smallest_angle(&new));
+    }
 }
 
 #[test]
@@ -141,8 +158,7 @@ fn corners_and_patches_that_are_to_stay_do() {
     let bottom = old.triangles.iter().find(|t| t.vertices.iter().all(|&v| old.points[v as usize].z == 0.0));
     let (bottom, _) = bottom.and_then(|t| t.patch).expect("a triangle at the bottom");
     let stay = HashSet::from([bottom]);
-    let new =
-        remeshed(&old, &fixture.projector, &UniformSize(0.1), &stay).expect("a skin").expect("a change");
+    let new = remeshed(&fixture, &old, 0.1, &stay).expect("triangles that may change");
     let of = |skin: &Skin, patch: PatchId| -> Vec<_> {
         let on = skin.triangles.iter().filter(|t| t.patch.is_some_and(|(of, _)| of == patch));
         let mut on: Vec<_> = on.map(|t| bits(skin, t)).collect();
@@ -158,10 +174,7 @@ fn corners_and_patches_that_are_to_stay_do() {
     assert_eq!(corners(&new).len(), 8);
     let all: HashSet<PatchId> =
         old.triangles.iter().filter_map(|t| t.patch).map(|(patch, _)| patch).collect();
-    assert_eq!(
-        remeshed(&old, &fixture.projector, &UniformSize(0.1), &all).map(|new| new.is_none()),
-        Ok(true)
-    );
+    assert!(remeshed(&fixture, &old, 0.1, &all).is_none());
 }
 
 /// All edges of curves are in the list of edges, each with the class of its curve.
@@ -170,8 +183,7 @@ fn curves_stay_curves() {
     for fixture in [cylinder(2), cube(4, false)] {
         let old =
             skin(&parts(&fixture, &in_slabs(&fixture, 1))[0], &fixture.projector, 3).expect("a skin").skin;
-        let new = remeshed(&old, &fixture.projector, &UniformSize(0.15), &HashSet::new());
-        let new = new.expect("a skin").expect("triangles that may change");
+        let new = remeshed(&fixture, &old, 0.15, &HashSet::new()).expect("triangles that may change");
         let lengths = |skin: &Skin| {
             let mut lengths: BTreeMap<Class, f64> = BTreeMap::new();
             for ([a, b], class) in &skin.edges {

@@ -47,11 +47,13 @@ pub struct RemeshSettings {
     pub short: f64,
     /// Edges longer than this are split (units of the wanted size).
     pub long: f64,
+    /// The most times that sizes are lowered at intersections before the mesh is returned as it is.
+    pub corrections: usize,
 }
 
 impl Default for RemeshSettings {
     fn default() -> Self {
-        Self { rounds: 6, turn: 1.1, short: 0.7, long: 1.4 }
+        Self { rounds: 6, turn: 1.1, short: 0.7, long: 1.4, corrections: 14 }
     }
 }
 
@@ -80,9 +82,6 @@ const LOWERED_GRADING: f64 = 1.0;
 /// The most rounds of splits until all edges are short enough; each halves long edges, except that
 /// two rounds may be needed in thin triangles.
 const MOST_SPLITS: usize = 80;
-
-/// The most times that sizes are lowered at intersections before the mesh is returned as it is.
-const MOST_CORRECTIONS: usize = 14;
 
 /// After this many corrections in a row with more intersections than before, the mesh is returned
 /// as it is: smaller triangles only fold more often.
@@ -152,7 +151,7 @@ fn remesh_in_pool<E>(
             correction == 0 && !report.crossings.is_empty() && !model.intersections().is_empty();
         worse = if report.crossings.len() > before { worse + 1 } else { 0 };
         before = report.crossings.len();
-        let is_last = correction == MOST_CORRECTIONS
+        let is_last = correction == settings.corrections
             || worse == MOST_WORSE
             || is_input_crossed
             || sheet.size.work().is_cancelled();
