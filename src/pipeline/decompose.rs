@@ -133,7 +133,7 @@ pub fn planned(
 ) -> Result<Planned, Error> {
     options::refuse_planes(&cuts.planes)?;
     options::refuse_impossible_coarse(settings, wanted)?;
-    let request = Request { wanted, refined: 1, accepted: Request::FILLED };
+    let request = Request { wanted, refined: 1 };
     plan_cuts(parts, &geometry.model, cuts, settings, request, progress)
 }
 

@@ -82,8 +82,7 @@ impl GenerateSettings {
             Wanted::Elements(count) => Wanted::Elements(count.div_ceil(8_u64.pow(self.refine))),
             wanted => wanted,
         };
-        let accepted = if self.method == Method::Refine { Request::REFINED } else { Request::FILLED };
-        Request { wanted, refined: 1 << self.refine, accepted }
+        Request { wanted, refined: 1 << self.refine }
     }
 }
 
@@ -94,18 +93,6 @@ pub(super) struct Request {
     pub wanted: Wanted,
     /// Subdivisions of each edge by that refinement.
     pub refined: u32,
-    /// The range of numbers of tets that are accepted, relative to a requested one.
-    pub accepted: [f64; 2],
-}
-
-impl Request {
-    /// The accepted numbers if the coarse tets are subdivided.
-    pub const REFINED: [f64; 2] = [1.0, 1.3];
-
-    /// The accepted numbers if the parts are filled by sizes: these are scaled for the requested
-    /// number, but those at interfaces follow from the coarse mesh. With 0.75 the smallest angle of
-    /// a tunnel in eight parts is 25° instead of 29°.
-    pub const FILLED: [f64; 2] = [0.9, 1.3];
 }
 
 /// The requested number of tets.

@@ -31,15 +31,16 @@ const LEAST_OF_PART: u64 = 100;
 /// number.
 const MOST_ODD: u32 = 15;
 
-/// The number of subdivisions with a small odd factor that turns `tets` coarse tets into nearest to
-/// `count`, within the `accepted` range relative to it.
-fn pieces_within(tets: u64, (count, accepted): (u64, [f64; 2]), order: Order) -> Option<u32> {
-    let share = |n: u32| tets as f64 * f64::from(n).powi(3) / count as f64;
-    let distance = |&n: &u32| share(n).ln().abs();
-    (1..=MAX_PIECES / order.degree())
-        .take_while(|&n| share(n) <= accepted[1])
-        .filter(|&n| is_cheap(n) && share(n) >= accepted[0])
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+/// The accepted factor above the requested number, as numerator and denominator.
+const ROOM: [u64; 2] = [13, 10];
+
+/// The least number of subdivisions with a small odd factor that turns `tets` coarse tets into
+/// `count` to 1.3·`count`.
+fn pieces_within(tets: u64, count: u64, order: Order) -> Option<u32> {
+    let made = |n: u32| u128::from(tets) * u128::from(n).pow(3);
+    let most = u128::from(count) * u128::from(ROOM[0]) / u128::from(ROOM[1]);
+    let first = pieces_for(tets, count);
+    (first..=MAX_PIECES / order.degree()).take_while(|&n| made(n) <= most).find(|&n| is_cheap(n))
 }
 
 fn is_cheap(n: u32) -> bool {
@@ -66,7 +67,7 @@ pub(super) fn mesh_as_wanted(
     parts: u32,
     model: &Model,
     settings: &CoarseSettings,
-    Request { wanted, refined, accepted }: Request,
+    Request { wanted, refined }: Request,
     sources: &[Source],
     budget: &Budget,
     work: &Work,
@@ -120,7 +121,7 @@ pub(super) fn mesh_as_wanted(
                 let tets = count.div_ceil(u64::from(pieces).pow(3));
                 // Accept a coarse mesh near the goal for which some number of subdivisions fits.
                 let near = |made: u64| made >= tets / 2 && made <= 4 * tets;
-                let pieces_of = |made: u64| pieces_within(made, (count, accepted), order);
+                let pieces_of = |made: u64| pieces_within(made, count, order);
                 let fits = |made: u64| near(made) && pieces_of(made).is_some();
                 let is_of_use = |made: u64| pieces == 1 || pieces_of(made).is_some();
                 let (made, outcome) = to_target(tets, pieces, &fits, &is_of_use)?;
@@ -143,29 +144,19 @@ mod tests {
 
     #[test]
     fn pieces_are_chosen_that_give_the_number_and_little_more() {
-        let refined = |tets: u64, count: u64| pieces_within(tets, (count, Request::REFINED), Order::First);
-        assert_eq!(refined(5_800, 1_400_000_000), Some(64));
-        assert_eq!(refined(5_000, 5_000), Some(1));
-        assert_eq!(refined(6_501, 5_000), None);
+        assert_eq!(pieces_within(5_800, 1_400_000_000, Order::First), Some(64));
+        assert_eq!(pieces_within(5_000, 5_000, Order::First), Some(1));
+        assert_eq!(pieces_within(6_501, 5_000, Order::First), None);
         // 17 and 19 subdivisions are skipped for 18 and 20.
-        assert_eq!(refined(1_000, 17_u64.pow(3) * 1_000), Some(18));
-        assert_eq!(refined(9, 10_000_000_000), None);
-    }
-
-    #[test]
-    fn parts_that_are_filled_get_the_nearest_number() {
-        let filled = |tets: u64, count: u64| pieces_within(tets, (count, Request::FILLED), Order::First);
-        assert_eq!(filled(23_000, 200_000), Some(2), "0.92 of the number");
-        assert_eq!(filled(1_000, 25_000), Some(3));
-        assert_eq!(filled(1_000, 30_000), Some(3));
-        assert_eq!(filled(1_000, 45_000), None);
+        assert_eq!(pieces_within(1_000, 17_u64.pow(3) * 1_000, Order::First), Some(18));
+        assert_eq!(pieces_within(9, 10_000_000_000, Order::First), None);
     }
 
     #[test]
     fn nearly_every_coarse_mesh_fits_a_large_number() {
-        let within = |tets: u64, count: u64| pieces_within(tets, (count, Request::REFINED), Order::First);
         for count in [100_000_000, 1_400_000_000, 10_000_000_000_u64] {
-            let fitting = (5_000..10_000).filter(|&tets| within(tets, count).is_some()).count();
+            let fitting =
+                (5_000..10_000).filter(|&tets| pieces_within(tets, count, Order::First).is_some()).count();
             assert!(fitting > 4_000, "{count}: {fitting}");
         }
     }
