@@ -26,7 +26,7 @@ pub(super) struct Rim {
 }
 
 impl Rim {
-    /// `edges` are the middles and lengths of edges that stay, inside `bounds`.
+    /// `edges` are the middles and lengths of edges that stay, in the box `around`.
     pub fn new(around: Aabb, edges: Vec<Source>) -> Self {
         let reach = |edge: &Source| {
             let way = Vector::repeat(0.5 * edge.size + LEAST * edge.size / GRADING);
